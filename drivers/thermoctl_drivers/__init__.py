@@ -1,0 +1,1 @@
+"""Drivers that come with thermoctl; each is found by its entry point."""

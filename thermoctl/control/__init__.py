@@ -1,0 +1,1 @@
+"""The power to ask for."""

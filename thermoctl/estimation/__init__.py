@@ -1,0 +1,1 @@
+"""What is believed about the plant, and how sure the belief is."""

@@ -1,0 +1,1 @@
+"""Simulated physics: a stirred tank with everything that makes control hard."""

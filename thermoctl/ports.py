@@ -1,0 +1,184 @@
+"""Where rooms meet without knowing each other: protocols only.
+
+Runtime and drivers know these, not each other; `thermoctl.app.compose` puts them together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol, runtime_checkable
+
+from thermoctl.quantities import Array
+from thermoctl.signals import Beliefs, Estimate, RawSample
+
+
+class Clock(Protocol):
+    """Monotonic time; a simulated clock makes an hour run in seconds with the same code."""
+
+    def now_s(self) -> float:
+        """Return the time in s; its zero is arbitrary and it never goes back."""
+        ...
+
+    def sleep_until(self, t_s: float) -> None:
+        """Return at `t_s` or a little later; at once when it is past."""
+        ...
+
+
+class Link(Protocol):
+    """A byte stream with time-outs, as pyserial offers it; so a pty or a socket fits as well."""
+
+    timeout: float | None
+    write_timeout: float | None
+
+    def read(self, size: int = 1) -> bytes:
+        """Return up to `size` bytes, fewer when `timeout` passes first."""
+        ...
+
+    def write(self, data: bytes, /) -> int | None:
+        """Write all of `data`; raise when `write_timeout` passes first."""
+        ...
+
+    def reset_input_buffer(self) -> None:
+        """Forget what has come and was not read."""
+        ...
+
+    def close(self) -> None:
+        """Let the device go."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Capabilities:
+    """What a board can do beyond reading and writing."""
+
+    dead_man: bool = False
+    readback: bool = False
+    push: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Who answered: kind, serial number or port, firmware version."""
+
+    kind: str
+    name: str
+    version: str
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """How a board is doing: ``status`` is ``ok``, ``degraded`` or ``down``."""
+
+    status: str
+    counters: Mapping[str, int] = field(default_factory=dict)
+    last_good_s: float | None = None
+    last_error: str | None = None
+
+
+class Board(Protocol):
+    """Hardware with inputs and outputs. Synchronous; every call has a deadline on the clock.
+
+    A class is built as ``Driver(settings, link, clock)`` and does no I/O before `open`.
+    `read` and `write` raise a `thermoctl.errors.DriverError`, never anything else.
+    """
+
+    Settings: ClassVar[type[Any]]
+    capabilities: Capabilities
+
+    def open(self, deadline_s: float) -> Identity:
+        """Write power 0 first, then identify the board; raise `LinkError` or `WrongDevice`."""
+        ...
+
+    def read(self, deadline_s: float) -> Mapping[str, RawSample]:
+        """Return every input, in one exchange; an input that did not answer is not in it."""
+        ...
+
+    def write(
+        self, outputs: Mapping[str, float], valid_for_s: float, deadline_s: float
+    ) -> Mapping[str, float]:
+        """Set `outputs`, re-arm the dead-man, and return what the hardware TOOK."""
+        ...
+
+    def health(self) -> Health:
+        """Return counters and the last error."""
+        ...
+
+    def close(self) -> None:
+        """Write safe values, let the device go; idempotent, never raises."""
+        ...
+
+
+@runtime_checkable
+class Simulated(Protocol):
+    """What only a simulated board can do: tell the truth, and be disturbed."""
+
+    def truth(self) -> Mapping[str, float]:
+        """Return what no sensor sees, such as ``true_temperature_c``."""
+        ...
+
+    def disturb(self, name: str, amount: float | None = None) -> str:
+        """Start the disturbance `name` and return a sentence that says what happened."""
+        ...
+
+
+class Estimator(Protocol):
+    """A law of estimation: frozen, holds constants only; the belief goes in and comes out."""
+
+    def update(self, belief: Estimate, phi: Array, y: float) -> Estimate:
+        """Return the belief after regressor `phi`, shape (n,), met output `y`."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Situation:
+    """What a controller may know when it is asked for a power.
+
+    Parameters
+    ----------
+    t_s, interval_s : float
+        Time of this sample, and since the previous one, in s.
+    temperature_c : float
+        This sample, or the model's prediction of it while the supervisor rides; NaN: not known.
+    setpoint_c : float
+        What to hold.
+    applied : float
+        Power the actuator took during the interval that has just ended.
+    estimate : Estimate
+        The belief after this sample.
+    y_past_c, u_past : ndarray
+        Past temperatures and applied powers, newest first: ``y_past_c[0]`` is this sample and
+        ``u_past[0]`` is `applied`. As many as the structure of the model needs.
+    """
+
+    t_s: float
+    interval_s: float
+    temperature_c: float
+    setpoint_c: float
+    applied: float
+    estimate: Estimate
+    y_past_c: Array
+    u_past: Array
+
+
+class Controller(Protocol):
+    """A law of control: frozen; what it must remember is a belief that goes in and comes out."""
+
+    name: ClassVar[str]
+
+    def start(self) -> Any:
+        """Return the belief before the first sample."""
+        ...
+
+    def decide(self, belief: Any, situation: Situation) -> tuple[Any, float]:
+        """Return the new belief and the power to ask for; not yet bounded, may be NaN."""
+        ...
+
+    def beliefs(self, belief: Any, situation: Situation) -> Beliefs:
+        """Return the estimate in the operator's words, holding power included if known."""
+        ...
+
+    @property
+    def ride_s(self) -> float:
+        """How long the model may steer without a sensor: three lags it was built for, or 0."""
+        ...

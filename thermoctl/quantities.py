@@ -1,0 +1,34 @@
+"""Units and the few numbers every room shares.
+
+A float with a dimension wears it in its name: ``_s`` seconds, ``_c`` degrees Celsius, ``_k`` kelvin
+(a difference), ``_w`` watts, ``_v`` volts. Power is a fraction in [0, 1] and is called ``power``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+ZERO_CELSIUS_K = 273.15
+"""0 degC in kelvin, exact by definition."""
+
+
+def is_finite_number(value: Any) -> bool:
+    """Return whether `value` is a real number that is neither NaN nor infinite; bool is none."""
+    if isinstance(value, bool):
+        return False
+    if isinstance(value, int | float | np.integer | np.floating):
+        return math.isfinite(value)
+    return False
+
+
+def clamp(value: float, low: float, high: float) -> float:
+    """Return `value` limited to [low, high]; NaN becomes `low`, the safe end of every output."""
+    if not value >= low:  # written so that NaN fails too
+        return low
+    return min(value, high)

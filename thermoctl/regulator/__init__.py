@@ -1,0 +1,1 @@
+"""One measurement in, one step out: modes, limits, trips, alarms."""

@@ -1,0 +1,1 @@
+"""The loop, its clock, its watchdog and the feed of finished cycles."""

@@ -1,0 +1,1 @@
+"""Consumers of finished cycles: history, state on disk, journal. They never steer."""

@@ -1,0 +1,247 @@
+"""What travels through the house: frozen values, one for each step of a sample's walk.
+
+    RawSample -> Measurement -> Estimate -> Command -> Step -> Cycle
+
+Requests travel the other way, through one queue that is read at the top of a cycle: `SetPoint`,
+`ManualPower`, `Mode`, `Acknowledge`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from thermoctl.quantities import Array
+
+
+class Quality(StrEnum):
+    """What is known of a reading. Its temperature is NaN unless GOOD or STALE."""
+
+    GOOD = "good"
+    MISSING = "missing"
+    OPEN = "open"
+    SHORT = "short"
+    STALE = "stale"
+
+
+class Mode(StrEnum):
+    """What the operator wants."""
+
+    OFF = "off"
+    MANUAL = "manual"
+    AUTO = "auto"
+    PROGRAM = "program"
+
+
+class State(StrEnum):
+    """What the supervisor allows; never mixed with the mode."""
+
+    RUN = "run"
+    RIDE = "ride"
+    HOLD = "hold"
+    SAFE = "safe"
+    LATCHED = "latched"
+
+
+@dataclass(frozen=True, slots=True)
+class RawSample:
+    """One input as the converter saw it.
+
+    Parameters
+    ----------
+    t_s : float
+        Time of the SAMPLE (not of the call) on the loop's monotonic clock, in s.
+    counts : float
+        Converter word, or the sum of a burst of them.
+    full_scale : float
+        Counts at the reference voltage; for a burst of N conversions of 10 bits, N * 1024.
+    sequence : int or None
+        The board's own sample counter; one that stands still is a frozen converter.
+    """
+
+    t_s: float
+    counts: float
+    full_scale: float
+    sequence: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """A temperature and what is known of it."""
+
+    t_s: float
+    temperature_c: float = math.nan
+    quality: Quality = Quality.GOOD
+
+
+@dataclass(frozen=True, slots=True)
+class SetPoint:
+    """Request: hold `value_c`."""
+
+    value_c: float
+
+
+@dataclass(frozen=True, slots=True)
+class ManualPower:
+    """Request: give `power`, a fraction in [0, 1], while the mode is MANUAL."""
+
+    power: float
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledge:
+    """Request: acknowledge the alarm `code`, or all of them; clears a latch whose cause is gone."""
+
+    code: str | None = None
+
+
+Request = Mode | SetPoint | ManualPower | Acknowledge
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """A belief about ARX parameters; its arrays are read-only.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (n,)
+        theta(t|t), the parameters after the last sample.
+    P : ndarray, shape (n, n)
+        P(t+1|t), what the next update starts from.
+    innovation : float
+        e(t) = y(t) - phi(t)' theta(t-1|t-1); NaN before the first update.
+    innovation_var : float
+        S(t), the variance the law expected of e(t); NaN before the first update.
+    inflation : float
+        lambda*(t) of O21 (26), or 1/lambda(t) for least squares; 1 for the plain filter.
+    rejected : bool
+        The last sample was not used (non-finite input, or a guard refused it).
+    """
+
+    theta: Array
+    P: Array
+    innovation: float = math.nan
+    innovation_var: float = math.nan
+    inflation: float = 1.0
+    rejected: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Beliefs:
+    """An estimate in the operator's words; None where the model in use says nothing.
+
+    `gain` is the heating rate at full power in K/s, `a` the pole of the first-order law (27);
+    ``*_sd`` is one standard deviation.
+    """
+
+    gain: float | None = None
+    gain_sd: float | None = None
+    a: float | None = None
+    a_sd: float | None = None
+    holding_power: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A power that expires: without a fresh command the output falls to zero.
+
+    Parameters
+    ----------
+    power : float
+        Fraction in [0, 1], finite, already bounded.
+    valid_until_s : float
+        Loop time after which no level may go on giving this power.
+    reason : str
+        Which rule decided the power: ``control``, ``off``, ``sensor.open``, ``limit.rate``, ...
+    """
+
+    power: float
+    valid_until_s: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """One row of ``thermoctl alarms``.
+
+    Parameters
+    ----------
+    code : str
+        Stable name, such as ``sensor.open``; listed in docs/events.md.
+    fault : int or None
+        Row of the fault table it belongs to.
+    priority : int
+        1 acts now (SAFE, LATCHED), 2 warns, 3 informs.
+    since_s : float
+        Loop time at which it became active.
+    text : str
+        What was expected and what came.
+    """
+
+    code: str
+    fault: int | None
+    priority: int
+    since_s: float
+    text: str
+    active: bool = True
+    latched: bool = False
+    acknowledged: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A change of state worth a line in the journal; `name` is API, values travel as fields."""
+
+    t_s: float
+    name: str
+    fields: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """Everything the regulator made of one measurement."""
+
+    t_s: float
+    measurement: Measurement
+    mode: Mode
+    state: State
+    setpoint_c: float
+    command: Command
+    controller: str
+    estimate: Estimate
+    beliefs: Beliefs = field(default_factory=Beliefs)
+    alarms: tuple[Alarm, ...] = ()
+    events: tuple[Event, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cycle:
+    """A finished cycle of one loop, as it is published into the feed.
+
+    Parameters
+    ----------
+    loop : str
+        Name of the loop in the configuration.
+    step : Step
+        The regulator's step.
+    accepted_power : float
+        What the hardware took, as a fraction; NaN when it took nothing.
+    tick_us : float
+        CPU time of the regulator's part of the cycle.
+    late_s : float
+        How long after its deadline the cycle woke.
+    missed : int
+        Cycles lost since the start.
+    truth : mapping
+        What only a simulation knows, such as ``true_temperature_c``.
+    """
+
+    loop: str
+    step: Step
+    accepted_power: float
+    tick_us: float = 0.0
+    late_s: float = 0.0
+    missed: int = 0
+    truth: Mapping[str, float] = field(default_factory=dict)

@@ -1,0 +1,1 @@
+"""Offline work without a clock: replay of records and reproduction of experiments."""
