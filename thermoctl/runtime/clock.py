@@ -1,0 +1,75 @@
+"""The two kinds of time: the machine's monotonic clock, and a simulated one.
+
+Both satisfy `thermoctl.ports.Clock`, so an hour in a simulation runs the code a real hour runs.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+
+
+class MonotonicClock:
+    """The machine's monotonic clock; `interrupt` ends a sleep at once, from any thread."""
+
+    def __init__(self) -> None:
+        self._woken = threading.Event()
+
+    def now_s(self) -> float:
+        """Return seconds since an arbitrary zero; never goes back, whatever the wall clock does."""
+        return time.monotonic()
+
+    def sleep_until(self, t_s: float) -> None:
+        """Return at `t_s`, or when `interrupt` is called; at once when `t_s` is past."""
+        remaining_s = t_s - time.monotonic()
+        if remaining_s > 0.0:
+            self._woken.wait(remaining_s)
+
+    def interrupt(self) -> None:
+        """End this and every later sleep; used to stop, never to hurry a cycle."""
+        self._woken.set()
+
+
+class SimulatedClock:
+    """Time that moves only when somebody sleeps, or is told to."""
+
+    def __init__(self, start_s: float = 0.0) -> None:
+        self._now_s = start_s
+
+    def now_s(self) -> float:
+        """Return the simulated time in s."""
+        return self._now_s
+
+    def sleep_until(self, t_s: float) -> None:
+        """Be at `t_s` at once; time never goes back."""
+        self._now_s = max(self._now_s, t_s)
+
+    def advance(self, seconds: float) -> None:
+        """Move time on by `seconds`, at least zero."""
+        if not seconds >= 0.0:
+            raise ValueError(f"time only moves forward, got {seconds!r} s")
+        self._now_s += seconds
+
+    def interrupt(self) -> None:
+        """Do nothing: a simulated sleep is over before anybody could end it."""
+
+
+class PacedClock(SimulatedClock):
+    """Simulated time that keeps a fixed ratio to real time: ``speed`` simulated seconds a second."""
+
+    def __init__(self, speed: float, start_s: float = 0.0) -> None:
+        if not 0.0 < speed < float("inf"):
+            raise ValueError(f"speed must be positive and finite, got {speed!r}")
+        super().__init__(start_s)
+        self._speed = speed
+        self._real = MonotonicClock()
+        self._anchor_s = self._real.now_s() - start_s / speed
+
+    def sleep_until(self, t_s: float) -> None:
+        """Sleep as long as `t_s` takes at this speed; a late wake is made good, not repeated."""
+        self._real.sleep_until(self._anchor_s + t_s / self._speed)
+        super().sleep_until(t_s)
+
+    def interrupt(self) -> None:
+        """End this and every later sleep."""
+        self._real.interrupt()
