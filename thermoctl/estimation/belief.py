@@ -1,0 +1,97 @@
+"""How a belief begins, and the checks every constructor of this room shares.
+
+Implements sections 2 and 6 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from thermoctl.quantities import Array, is_finite_number
+from thermoctl.signals import Estimate
+
+LARGEST = 1e150
+"""Beyond this a square overflows: no variance, parameter or scaled innovation is let past it."""
+
+
+def start(n: int, P0: float | npt.ArrayLike = 1.0, theta0: npt.ArrayLike | None = None) -> Estimate:
+    """Return the belief before the first sample.
+
+    Parameters
+    ----------
+    n : int
+        Number of parameters, at least 1.
+    P0 : float or array_like, shape (n, n)
+        Covariance the first update starts from, unchanged; a float stands for ``P0 * I``.
+    theta0 : array_like, shape (n,), optional
+        First guess of the parameters; zeros by default.
+
+    Raises
+    ------
+    ValueError
+        `n` is no positive integer; `P0` is not finite, symmetric and positive semi-definite of
+        that size; `theta0` is not finite or not of that shape.
+    """
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
+        raise ValueError(f"n must be a positive integer, got {n!r}")
+    return Estimate(_parameters("theta0", theta0, int(n)), covariance("P0", P0, int(n)))
+
+
+def frozen(values: Array) -> Array:
+    """Return `values` after making the array read-only."""
+    values.setflags(write=False)
+    return values
+
+
+def covariance(name: str, value: float | npt.ArrayLike, n: int | None = None) -> Array:
+    """Return a read-only covariance matrix made of `value`, a matrix or a float times I.
+
+    Raises
+    ------
+    ValueError
+        `value` is not finite, symmetric and positive semi-definite, or not of shape (n, n).
+    """
+    matrix = numbers(name, value)
+    if matrix.ndim == 0 and n is not None:
+        matrix = float(matrix) * np.eye(n)
+    size = matrix.shape[0] if n is None and matrix.ndim else n
+    if matrix.shape != (size, size):
+        raise ValueError(f"{name} must be a float or of shape ({size}, {size}), got {matrix.shape}")
+    scale = float(np.abs(matrix).max())
+    if not scale < LARGEST:
+        raise ValueError(f"{name} must lie below {LARGEST:g}, got {scale:g}")
+    if np.abs(matrix - matrix.T).max() > 1e-9 * scale:
+        raise ValueError(f"{name} must be symmetric, got {matrix.tolist()}")
+    matrix = 0.5 * (matrix + matrix.T)
+    smallest = float(np.linalg.eigvalsh(matrix)[0])
+    if smallest < -1e-9 * scale:
+        raise ValueError(
+            f"{name} must be positive semi-definite, its smallest eigenvalue is {smallest:g}"
+        )
+    return frozen(matrix)
+
+
+def positive(name: str, value: float, at_most: float = LARGEST) -> None:
+    """Raise ``ValueError`` unless `value` is a number in (0, at_most]."""
+    if not is_finite_number(value) or not 0.0 < value <= at_most:
+        limit = "" if at_most == LARGEST else f" and at most {at_most:g}"
+        raise ValueError(f"{name} must be positive{limit}, got {value!r}")
+
+
+def numbers(name: str, value: npt.ArrayLike) -> Array:
+    """Return `value` as a new array of finite floats, or raise ``ValueError`` naming it."""
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must consist of numbers, got {value!r}") from error
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got {value!r}")
+    return array
+
+
+def _parameters(name: str, value: npt.ArrayLike | None, n: int) -> Array:
+    theta = np.zeros(n) if value is None else numbers(name, value)
+    if theta.shape != (n,):
+        raise ValueError(f"{name} must have shape ({n},), got {theta.shape}")
+    return frozen(theta)

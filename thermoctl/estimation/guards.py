@@ -1,0 +1,181 @@
+"""What keeps a recursive estimator sane for years, as a wrapper around any of the bare laws.
+
+Implements section 4 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from thermoctl.estimation.belief import frozen, positive, start
+from thermoctl.estimation.kalman import CorrectedKalman, RandomWalkKalman
+from thermoctl.estimation.least_squares import RecursiveLeastSquares
+from thermoctl.estimation.recursion import RecursiveLaw
+from thermoctl.quantities import Array
+from thermoctl.signals import Estimate
+
+EXCITATION_MEMORY = 50
+"""Samples over which the spread of the regressor is taken."""
+RESIDUALS = 60
+"""Innovations of the parallel least squares of which the median is taken."""
+RESIDUALS_MIN = 10
+"""Fewer innovations than this say nothing; the law's own R2 holds until then."""
+R2_FLOOR = 1e-6
+"""Least robust R2, as a share of the law's own: constant readings must not make it zero."""
+PARALLEL = RecursiveLeastSquares(forgetting=0.95)
+NORMAL_SD = 1.4826
+"""Standard deviation of a normal variable over the median of its magnitude."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Memory:
+    """What the guards remember: spread of the regressor, parallel least squares, residuals."""
+
+    phi_mean: Array
+    spread_squared: float
+    parallel: Estimate
+    residuals: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GuardedEstimate(Estimate):
+    """An estimate with what its guards remember.
+
+    Parameters
+    ----------
+    excitation : float
+        Root mean square distance of recent regressors from their mean, in the units of phi.
+    R2 : float
+        Noise variance the last update used; NaN where the law has none.
+    """
+
+    excitation: float = 0.0
+    R2: float = math.nan
+    _memory: _Memory | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Guarded:
+    r"""A bare law with guards against a life without excitation and a wrong R2.
+
+    Each guard is off unless asked for; without any, theta and P are those of the bare law.
+
+    Parameters
+    ----------
+    law : RecursiveLaw
+        One of the four bare laws.
+    covariance_max : float, optional
+        Largest variance a parameter may have. ``P <- D P D`` with
+        ``d_i = min(1, sqrt(covariance_max / P_ii))`` keeps P positive definite and its
+        correlations; about P0 is a good choice.
+    excitation_min : float, optional
+        Nothing is learned, and P stays, while the regressor has moved less than this (root mean
+        square about its running mean over some 50 samples, in the units of phi); about
+        ``3 sqrt(n)`` times the noise. A constant regressor then teaches nothing: leave it off for
+        the structure of O21 (27), whose learning of a at rest is its integral action.
+    robust_R2 : bool
+        Take R2 from a parallel least squares with forgetting .95: (1.4826 median |e|)^2 over its
+        last 60 innovations. For the two Kalman filters.
+
+    Raises
+    ------
+    TypeError
+        `law` is none of the bare laws.
+    ValueError
+        A limit is not positive, or `robust_R2` is asked of a law without R2.
+    """
+
+    law: RecursiveLaw
+    covariance_max: float | None = None
+    excitation_min: float | None = None
+    robust_R2: bool = False  # noqa: N815 - R2 keeps its letter
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.law, RecursiveLaw):
+            raise TypeError(f"law must be a bare estimator, got {type(self.law).__name__}")
+        if self.covariance_max is not None:
+            positive("covariance_max", self.covariance_max)
+        if self.excitation_min is not None:
+            positive("excitation_min", self.excitation_min)
+        if self.robust_R2 and not isinstance(self.law, RandomWalkKalman | CorrectedKalman):
+            raise ValueError(f"robust_R2 needs a law with R2, got {type(self.law).__name__}")
+
+    def update(self, belief: Estimate, phi: Array, y: float) -> GuardedEstimate:
+        """Return the belief after regressor `phi`, shape (n,), met output `y`.
+
+        `belief` may come from `start`; the memory of the guards then begins here. A sample that
+        teaches nothing for want of excitation is ``rejected``, with its innovation given.
+
+        Raises
+        ------
+        ValueError
+            `phi` does not have the shape of ``belief.theta``.
+        """
+        before = belief if isinstance(belief, GuardedEstimate) else _adopted(belief)
+        law = self._law(before._memory)
+        learned = law.update(before, phi, y)
+        if learned.rejected:
+            return replace(before, rejected=True)
+        memory = self._remembered(before, phi, y)
+        excitation = math.sqrt(memory.spread_squared)
+        paused = self.excitation_min is not None and excitation < self.excitation_min
+        return GuardedEstimate(
+            before.theta if paused else learned.theta,
+            before.P if paused else self._bounded(learned.P),
+            learned.innovation,
+            learned.innovation_var,
+            1.0 if paused else learned.inflation,
+            paused,
+            excitation,
+            getattr(law, "R2", math.nan),
+            memory,
+        )
+
+    def _bounded(self, P: Array) -> Array:
+        """Return P with no variance above `covariance_max` and its correlations kept."""
+        if self.covariance_max is None or not P.diagonal().max() > self.covariance_max:
+            return P
+        d = np.sqrt(np.minimum(1.0, self.covariance_max / P.diagonal().clip(min=1e-300)))
+        return frozen(np.multiply.outer(d, d) * P)
+
+    def _law(self, memory: _Memory | None) -> RecursiveLaw:
+        """Return the law with the R2 of the moment."""
+        law = self.law
+        if not self.robust_R2 or memory is None or len(memory.residuals) < RESIDUALS_MIN:
+            return law
+        assert isinstance(law, RandomWalkKalman | CorrectedKalman)
+        middle = len(memory.residuals) // 2
+        sd = NORMAL_SD * float(np.partition(memory.residuals, middle)[middle])
+        return replace(law, R2=max(sd * sd, R2_FLOOR * law.R2))
+
+    def _remembered(self, before: GuardedEstimate, phi: Array, y: float) -> _Memory:
+        """Return the memory after a usable sample."""
+        memory = before._memory
+        if memory is None:
+            scale = getattr(self.law, "R2", 1.0)  # least squares counts in units of the noise
+            parallel = start(len(before.theta), before.P / scale, before.theta)
+            memory = _Memory(np.array(phi, dtype=np.float64), 0.0, parallel, np.empty(0))
+        share = 1.0 / EXCITATION_MEMORY
+        step = phi - memory.phi_mean
+        spread_squared = (1.0 - share) * (memory.spread_squared + share * float(step.dot(step)))
+        parallel, residuals = memory.parallel, memory.residuals
+        if self.robust_R2:
+            parallel = PARALLEL.update(parallel, phi, y)
+            newest = () if parallel.rejected else (abs(parallel.innovation),)
+            residuals = frozen(np.concatenate((newest, residuals[: RESIDUALS - 1])))
+        return _Memory(frozen(memory.phi_mean + share * step), spread_squared, parallel, residuals)
+
+
+def _adopted(belief: Estimate) -> GuardedEstimate:
+    """Return a bare belief as one whose guards remember nothing yet."""
+    return GuardedEstimate(
+        belief.theta,
+        belief.P,
+        belief.innovation,
+        belief.innovation_var,
+        belief.inflation,
+        belief.rejected,
+    )

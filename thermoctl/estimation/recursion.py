@@ -1,0 +1,140 @@
+r"""The recursion every estimator of this room runs, for one sample of one loop.
+
+All of them are the same Kalman update and differ in two numbers, which a law computes in `weigh`:
+the variance :math:`S` it expected of the innovation, and the factor :math:`\lambda` by which the
+covariance is inflated afterwards.
+
+.. math::
+
+    \theta \leftarrow \theta + P\varphi\, e / S, \qquad
+    P \leftarrow \lambda\,(P - P\varphi\varphi^T P / S) + R_1
+
+Implements section 2 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from thermoctl.estimation.belief import LARGEST, covariance, frozen
+from thermoctl.quantities import Array, is_finite_number
+from thermoctl.signals import Estimate
+
+V = TypeVar("V", float, Array)
+"""A number of one loop, or one for each replication."""
+
+
+class Arithmetic(NamedTuple, Generic[V]):
+    """The larger and the smaller of two, for numbers or for arrays."""
+
+    maximum: Callable[[float, V], V]
+    minimum: Callable[[float, V], V]
+
+
+NUMBERS: Arithmetic[float] = Arithmetic(max, min)
+ARRAYS: Arithmetic[Array] = Arithmetic(np.maximum, np.minimum)
+
+
+class RecursiveLaw(ABC):
+    """A law that learns theta of ``y = phi' theta + v`` from one sample at a time."""
+
+    __slots__ = ()
+
+    @property
+    @abstractmethod
+    def R1(self) -> float | Array:
+        """Drift covariance added after every sample; 0 for least squares."""
+
+    @abstractmethod
+    def weigh(self, q: V, e: V, n: int, arithmetic: Arithmetic[V]) -> tuple[V, V | float]:
+        """Return S, the variance expected of innovation `e`, and the inflation of P.
+
+        `q` is ``phi' P phi`` and `n` the number of parameters.
+        """
+
+    def update(self, belief: Estimate, phi: Array, y: float) -> Estimate:
+        """Return the belief after regressor `phi` met output `y`.
+
+        Parameters
+        ----------
+        belief : Estimate
+            What was believed before; it is not changed.
+        phi : ndarray, shape (n,)
+            Regressor, in the units the parameters are to have.
+        y : float
+            Output.
+
+        Returns
+        -------
+        Estimate
+            The new belief. Where `phi` or `y` is not finite, or the result would not be, the old
+            one with ``rejected=True``.
+
+        Raises
+        ------
+        ValueError
+            `phi` does not have the shape of ``belief.theta``, or R1 that of ``belief.P``.
+        """
+        phi = np.asarray(phi, dtype=np.float64)
+        theta, P = belief.theta, belief.P
+        if phi.shape != theta.shape:
+            raise ValueError(f"phi must have shape {theta.shape}, got {phi.shape}")
+        # ndarray.dot, not @: it is twice as fast here, and silent where @ warns of overflow.
+        P_phi = P.dot(phi)
+        e = float(y) - float(theta.dot(phi))
+        q = max(float(phi.dot(P_phi)), 0.0)  # rounding can leave a vanishing one below zero
+        S, inflation = self.weigh(q, e, len(theta), NUMBERS)
+        # One comparison each, false for NaN: inside, none of the arithmetic below can overflow.
+        if not (0.0 < S < LARGEST and e * e < LARGEST * S):
+            return rejected(belief)
+        root = math.sqrt(S)
+        g = P_phi / root
+        theta = theta + g * (e / root)  # O21 (18), (19)
+        # g g' is symmetric to the last bit, and so P stays, without a second pass over it.
+        P = P - np.multiply.outer(g, g)  # O21 (21)
+        if inflation != 1.0:
+            P *= inflation  # O21 (25), or (13) with 1/lambda
+        R1 = self.R1
+        if isinstance(R1, np.ndarray):
+            P += drift(R1, len(theta))  # O21 (20)
+        elif R1:
+            P += R1 * identity(len(theta))  # O21 (20)
+        if not np.vdot(P, P) + theta.dot(theta) < LARGEST * LARGEST:
+            return rejected(belief)
+        return Estimate(frozen(theta), frozen(P), e, S, inflation, False)
+
+
+def rejected(belief: Estimate) -> Estimate:
+    """Return `belief` with nothing changed but the mark that a sample was not used."""
+    return replace(belief, rejected=True)
+
+
+def checked_drift(value: float | Array) -> float | Array:
+    """Return R1 as a float or a read-only matrix, or raise ``ValueError`` naming it."""
+    if is_finite_number(value) and 0.0 <= value < LARGEST:
+        return float(value)
+    if np.ndim(value) == 2:
+        return covariance("R1", value)
+    raise ValueError(f"R1 must be a non-negative float or a covariance matrix, got {value!r}")
+
+
+def drift(R1: float | Array, n: int) -> Array:
+    """Return R1 as a matrix of shape (n, n); raise ``ValueError`` when it has another shape."""
+    if not isinstance(R1, np.ndarray):
+        return R1 * identity(n)
+    if R1.shape != (n, n):
+        raise ValueError(f"R1 must be a float or of shape ({n}, {n}), got {R1.shape}")
+    return R1
+
+
+@lru_cache(maxsize=32)
+def identity(n: int) -> Array:
+    """Return the read-only unit matrix of size `n`."""
+    return frozen(np.eye(n))
