@@ -21,7 +21,7 @@ EXCITATION_MEMORY = 50
 """Samples over which the spread of the regressor is taken."""
 RESIDUALS = 60
 """Innovations of the parallel least squares of which the median is taken."""
-RESIDUALS_MIN = 10
+RESIDUALS_MIN = 5
 """Fewer innovations than this say nothing; the law's own R2 holds until then."""
 R2_FLOOR = 1e-6
 """Least robust R2, as a share of the law's own: constant readings must not make it zero."""

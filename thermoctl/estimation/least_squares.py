@@ -36,7 +36,7 @@ class RecursiveLeastSquares(RecursiveLaw):
         positive("forgetting", self.forgetting, at_most=1.0)
 
     @property
-    def R1(self) -> float:
+    def R1(self) -> float:  # noqa: N802 - R1 keeps its letter
         """Return 0: forgetting takes the place of a drift."""
         return 0.0
 
@@ -84,7 +84,7 @@ class VariableForgetting(RecursiveLaw):
             raise ValueError(f"joint must be True or False, got {self.joint!r}")  # noqa: TRY004
 
     @property
-    def R1(self) -> float:
+    def R1(self) -> float:  # noqa: N802 - R1 keeps its letter
         """Return 0: forgetting takes the place of a drift."""
         return 0.0
 

@@ -49,7 +49,7 @@ class RecursiveLaw(ABC):
 
     @property
     @abstractmethod
-    def R1(self) -> float | Array:
+    def R1(self) -> float | Array:  # noqa: N802 - R1 keeps its letter
         """Drift covariance added after every sample; 0 for least squares."""
 
     @abstractmethod
