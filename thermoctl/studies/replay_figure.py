@@ -1,0 +1,173 @@
+"""Figure of a replay: the record, each parameter by every law, each law's innovations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from thermoctl.quantities import Array
+from thermoctl.studies import figure as house
+from thermoctl.studies.record import GAP
+from thermoctl.studies.replay import Replay
+from thermoctl.studies.words import number, probability
+
+_RECORD_IN, _PARAMETER_IN, _INNOVATION_IN = (1.25, 0.6), 0.95, 0.8
+_TOP_IN, _BOTTOM_IN, _SPACE_IN = 0.45, 0.5, 0.33
+
+
+def draw_replay(result: Replay, paths: list[Path]) -> list[Path]:
+    """Draw `result` and write it to each of `paths` (.png or .svg).
+
+    The first law is the one under study, drawn with its band of two standard deviations; the
+    parameters of at most four laws share a panel, the innovations of every law have their own.
+
+    Raises
+    ------
+    Unavailable
+        If matplotlib is not installed.
+    ValueError
+        If a suffix is neither .png nor .svg.
+    OSError
+        If a file cannot be written.
+    """
+    names = parameter_names(result)
+    heights = [*_RECORD_IN, *[_PARAMETER_IN] * len(names), *[_INNOVATION_IN] * len(result.scores)]
+    height = sum(heights) + _SPACE_IN * (len(heights) - 1) + _TOP_IN + _BOTTOM_IN
+    grid = {"sharex": True, "height_ratios": heights}
+    with house.styled(house.WIDE_IN, height, len(heights), 1, **grid) as (figure, axes):
+        figure.subplots_adjust(
+            left=0.115,
+            right=0.865,
+            top=1.0 - _TOP_IN / height,
+            bottom=_BOTTOM_IN / height,
+            hspace=_SPACE_IN * len(heights) / sum(heights),
+        )
+        panels = list(axes[:, 0])
+        unit_s, unit = _time_unit(result)
+        _draw_record(result, panels[0], panels[1], unit_s)
+        for place, name in enumerate(names):
+            _draw_parameter(result, place, name, panels[2 + place], unit_s)
+        for place in range(len(result.scores)):
+            _draw_innovations(result, place, panels[2 + len(names) + place], unit_s)
+        for index, panel in enumerate(panels):
+            house.letter(panel, _letter(index))
+        duration = result.record.t_s[-1] / unit_s
+        panels[-1].set_xlim(0.0, duration)
+        panels[-1].set_xlabel(f"time, {unit}" if result.record.names.time else "row")
+        figure.align_ylabels(panels)
+        return [house.save(figure, path) for path in paths]
+
+
+def parameter_names(result: Replay) -> list[str]:
+    """Return a1 ... an, b1 ... bm, in the order of theta."""
+    order = result.conditions.order
+    return [f"a{k}" for k in range(1, order.n + 1)] + [f"b{k}" for k in range(1, order.m + 1)]
+
+
+def _letter(index: int) -> str:
+    """Return a, b ... z, aa, ab ..."""
+    return (chr(96 + index // 26) if index >= 26 else "") + chr(97 + index % 26)
+
+
+def _time_unit(result: Replay) -> tuple[float, str]:
+    """Return the unit of the time axis; rows stay rows."""
+    if result.record.names.time is None:
+        return 1.0, "row"
+    return house.minutes_or_hours(float(result.record.t_s[-1]))
+
+
+def _draw_record(result: Replay, output: Any, entry: Any, unit_s: float) -> None:
+    """Draw what was recorded: output as a line, input as steps with area."""
+    record = result.record
+    longest = GAP * record.period_s / unit_s
+    t, y = house.broken(record.t_s / unit_s, record.y, longest)
+    output.plot(*house.envelope(t, y), color=house.INK)
+    t, u = house.broken(record.t_s / unit_s, record.u, longest)
+    t, u = house.envelope(t, u)
+    entry.fill_between(t, u, step="post", color=house.SLATE, alpha=0.25, linewidth=0)
+    entry.step(t, u, where="post", color=house.SLATE, linewidth=0.8)
+    entry.set_ylim(bottom=min(0.0, float(np.min(record.u))))
+    house.label(output, float(record.y[-1]), "measured", house.INK)
+    house.label(entry, float(record.u[-1]), "applied", house.SLATE)
+    output.set_ylabel("output")
+    entry.set_ylabel("input")
+    house.score(output, f"{record.names.output} · {len(record.t_s):,} samples")
+    house.score(entry, f"{record.names.input}")
+
+
+def _draw_parameter(result: Replay, place: int, name: str, panel: Any, unit_s: float) -> None:
+    """Draw one parameter by up to four laws, the first with its band."""
+    drawn = list(zip(result.scores, result.traces, house.HUES, house.DASHES, strict=False))
+    low, high = _scale(result, place)
+    ends = []
+    for rank, (_, trace, hue, dash) in enumerate(drawn):
+        t = result.record.t_s[trace.index] / unit_s
+        if rank == 0:
+            spread = 2.0 * trace.theta_sd[:, place]
+            below, above = trace.theta[:, place] - spread, trace.theta[:, place] + spread
+            panel.fill_between(t, below, above, color=hue, alpha=0.2, linewidth=0)
+        t, theta = house.envelope(t, trace.theta[:, place])
+        panel.plot(t, theta, color=hue, linestyle=dash, zorder=3 - 0.1 * rank)
+        ends.append(float(np.clip(trace.theta[-1, place], low, high)))
+    apart = house.spread_out(ends, 0.15 * (high - low))
+    for (score, _, hue, _), y in zip(drawn, apart, strict=True):
+        house.label(panel, y, score.name, hue)
+    panel.set_ylim(low, high)
+    panel.set_ylabel(f"${name[0]}_{{{name[1:]}}}$")
+    first = result.scores[0]
+    house.score(panel, f"{first.name} {number(first.theta[place], first.theta_sd[place])}")
+
+
+def _scale(result: Replay, place: int) -> tuple[float, float]:
+    """Return the limits of a parameter's panel; what the laws did while learning may leave it."""
+    parts = []
+    for rank, trace in enumerate(result.traces[: len(house.HUES)]):
+        late = trace.index >= result.conditions.scored_from
+        theta = trace.theta[late, place]
+        low, high = np.percentile(theta, (2, 98))
+        # The median: with an input that stands still the band is wider than any panel for a while.
+        spread = 2.0 * float(np.median(trace.theta_sd[late, place])) if rank == 0 else 0.0
+        parts += [low - spread, high + spread, float(theta[-1])]
+    values = np.array(parts)
+    values = values[np.isfinite(values)]
+    low, high = float(values.min()), float(values.max())
+    margin = 0.1 * (high - low) or 0.1 * abs(high) or 1.0
+    return low - margin, high + margin
+
+
+def _draw_innovations(result: Replay, place: int, panel: Any, unit_s: float) -> None:
+    """Draw the innovations of one law over the band it expected them in."""
+    score, trace = result.scores[place], result.traces[place]
+    from_here = np.arange(len(result.record.t_s)) >= result.conditions.scored_from
+    known = np.flatnonzero(np.isfinite(trace.innovation) & from_here)
+    t, e, sd = (
+        values[known]
+        for values in (result.record.t_s / unit_s, trace.innovation, trace.innovation_sd)
+    )
+    outside = np.abs(e) > 2.0 * sd
+    shown = _thinned(len(e))
+    panel.fill_between(
+        t[shown], -2.0 * sd[shown], 2.0 * sd[shown], color=house.ALLOWED, linewidth=0
+    )
+    style = {"marker": "o", "linestyle": "none", "markeredgewidth": 0, "rasterized": len(e) > 2_000}
+    panel.plot(t[~outside], e[~outside], color=house.INK, markersize=1.4, **style)
+    panel.plot(t[outside], e[outside], color=house.OUTSIDE, markersize=2.0, **style)
+    reach = max(2.5 * float(np.median(sd)), float(np.percentile(np.abs(e), 99.5)))
+    panel.set_ylim(-1.15 * reach, 1.15 * reach)
+    panel.set_ylabel("$e$")
+    house.label(panel, 0.0, score.name, house.TEXT)
+    house.score(panel, _innovation_words(result, place, float(np.mean(~outside))))
+
+
+def _thinned(length: int) -> Array:
+    """Return indices that thin a long band to what a panel can show."""
+    return np.unique(np.linspace(0, length - 1, min(length, house.POINTS_PER_PANEL)).astype(int))
+
+
+def _innovation_words(result: Replay, place: int, inside: float) -> str:
+    """Return the score line of an innovation panel."""
+    score = result.scores[place]
+    p = probability(score.whiteness_p)
+    return f"rms {score.rms_error:.4g} · {100 * inside:.0f} % inside ±2√S · whiteness p {p}"

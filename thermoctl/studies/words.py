@@ -1,0 +1,23 @@
+"""Numbers as a reader wants them: as many digits as they deserve, a true minus, no NaN."""
+
+from __future__ import annotations
+
+import math
+
+
+def number(value: float, sd: float) -> str:
+    """Return `value` ± two standard deviations with the decimals that ± deserves."""
+    if not (math.isfinite(value) and math.isfinite(sd)):
+        return "–"
+    spread = 2.0 * sd
+    if not 1e-9 < spread < 1e6 or abs(value) > 1e9:
+        return f"{value:.4g} ± {spread:.2g}".replace("-", "−")
+    decimals = max(0, 1 - math.floor(math.log10(spread)))
+    return f"{value:.{decimals}f} ± {spread:.{decimals}f}".replace("-", "−")
+
+
+def probability(p: float) -> str:
+    """Return a probability as a reader wants it: two digits, nothing below a thousandth."""
+    if math.isnan(p):
+        return "–"
+    return "< 0.001" if p < 0.001 else f"{p:.2g}" if p < 0.1 else f"{p:.2f}"
