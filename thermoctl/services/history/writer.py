@@ -53,7 +53,8 @@ class HistoryWriter:
     commit_every_s : float
         Time between two commits; at most this much is lost with the process.
     feed_size : int
-        Cycles that wait for the writer, and rows that wait for the disk, before the oldest go.
+        Cycles that wait for the writer before the oldest go; twice as many rows, cycles and
+        events, wait for the disk.
     max_cycles : int
         Cycles kept in the file; the oldest go first. Counted in rows, not in days, because a wall
         clock that is a year ahead for a minute must not erase a year.
@@ -81,7 +82,7 @@ class HistoryWriter:
         self._commit_every_s = commit_every_s
         self._feed: deque[tuple[int, float, Cycle]] = deque(maxlen=feed_size)
         self._numbers = itertools.count()
-        self._waiting: deque[Row] = deque(maxlen=feed_size)
+        self._waiting: deque[Row] = deque(maxlen=2 * feed_size)  # events come on top of cycles
         self._taken = self._lost_in_feed = self._lost_waiting = self._written = self._set_aside = 0
         self._reported_drops = 0
         self._last_t_s: float | None = None

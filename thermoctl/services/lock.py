@@ -1,0 +1,80 @@
+"""One daemon per state folder and per device: the second is refused and told who holds it."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+from urllib.parse import quote
+
+from thermoctl.errors import Unavailable
+
+LONGEST: Final = 64
+
+
+def device_lock_path(directory: Path, device: str) -> Path:
+    """Return the lock file of `device` in `directory`; every name of one device gives the same."""
+    return directory / f"device-{quote(os.path.realpath(device), safe='')}.lock"
+
+
+class DaemonLock:
+    """A lock file with its holder's process id in it.
+
+    The kernel lets the lock go with the process, however it ends, so a file that was left behind
+    never keeps anybody out. The file itself stays: removing it would let two processes lock two
+    files of the same name.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = Path(path)
+        self._descriptor: int | None = None
+
+    def acquire(self) -> None:
+        """Take the lock; at once or not at all.
+
+        Raises
+        ------
+        Unavailable
+            Another process holds it, and the message names it; or the file cannot be made.
+        """
+        if self._descriptor is not None:
+            return
+        try:
+            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o640)
+        except OSError as error:
+            raise Unavailable(f"{self._path} should be a lock file: {error.strerror}") from error
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            os.ftruncate(descriptor, 0)
+            os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
+        except BlockingIOError:
+            holder = os.pread(descriptor, LONGEST, 0).decode(errors="replace").strip() or "unknown"
+            os.close(descriptor)
+            raise Unavailable(
+                f"expected to be alone with {self._path}, but process {holder} holds it"
+            ) from None
+        except OSError as error:
+            os.close(descriptor)
+            raise Unavailable(f"{self._path} should be lockable: {error.strerror}") from error
+        self._descriptor = descriptor
+
+    def release(self) -> None:
+        """Let the lock go; idempotent."""
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            os.close(descriptor)
+
+    def __enter__(self) -> Self:
+        self.acquire()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.release()
