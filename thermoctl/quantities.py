@@ -20,11 +20,12 @@ ZERO_CELSIUS_K = 273.15
 
 def is_finite_number(value: Any) -> bool:
     """Return whether `value` is a real number that is neither NaN nor infinite; bool is none."""
-    if isinstance(value, bool):
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return False
-    if isinstance(value, int | float | np.integer | np.floating):
+    try:
         return math.isfinite(value)
-    return False
+    except OverflowError:  # an integer beyond every float
+        return False
 
 
 def clamp(value: float, low: float, high: float) -> float:

@@ -107,6 +107,19 @@ class Identifier:
         phi = self.structure.regressor(belief.y_past_c, u_past)
         return self.structure.temperature(float(belief.estimate.theta.dot(phi)), u_past)
 
+    def foresee(self, belief: IdentifierBelief, applied: float) -> IdentifierBelief:
+        """Return the belief one sample on without a reading: the prediction stands in for it.
+
+        Nothing is learned. Meant for riding through a short gap, beside the belief that keeps the
+        gap: learning from one's own predictions would only confirm them.
+        """
+        temperature_c = self.predict(belief, applied)
+        return IdentifierBelief(
+            belief.estimate,
+            _pushed(belief.y_past_c, temperature_c),
+            _pushed(belief.u_past, applied),
+        )
+
 
 def _pushed(past: Array, newest: float) -> Array:
     """Return `past` with `newest` in front and the oldest gone."""

@@ -5,15 +5,20 @@ Both satisfy `thermoctl.ports.Clock`, so an hour in a simulation runs the code a
 
 from __future__ import annotations
 
-import threading
 import time
+
+_SLICE_S = 0.1  # how long a signal may have to wait for a sleep to end
 
 
 class MonotonicClock:
-    """The machine's monotonic clock; `interrupt` ends a sleep at once, from any thread."""
+    """The machine's monotonic clock; `interrupt` ends a sleep within 0.1 s.
+
+    `interrupt` only sets a flag, so that a signal handler may call it at any moment: an event or a
+    condition has a lock that the interrupted code may hold.
+    """
 
     def __init__(self) -> None:
-        self._woken = threading.Event()
+        self._interrupted = False
 
     def now_s(self) -> float:
         """Return seconds since an arbitrary zero; never goes back, whatever the wall clock does."""
@@ -21,13 +26,12 @@ class MonotonicClock:
 
     def sleep_until(self, t_s: float) -> None:
         """Return at `t_s`, or when `interrupt` is called; at once when `t_s` is past."""
-        remaining_s = t_s - time.monotonic()
-        if remaining_s > 0.0:
-            self._woken.wait(remaining_s)
+        while not self._interrupted and (remaining_s := t_s - time.monotonic()) > 0.0:
+            time.sleep(min(remaining_s, _SLICE_S))
 
     def interrupt(self) -> None:
         """End this and every later sleep; used to stop, never to hurry a cycle."""
-        self._woken.set()
+        self._interrupted = True
 
 
 class SimulatedClock:
@@ -55,7 +59,7 @@ class SimulatedClock:
 
 
 class PacedClock(SimulatedClock):
-    """Simulated time that keeps a fixed ratio to real time: ``speed`` simulated seconds a second."""
+    """Simulated time at a fixed ratio to real time: ``speed`` simulated seconds a second."""
 
     def __init__(self, speed: float, start_s: float = 0.0) -> None:
         if not 0.0 < speed < float("inf"):

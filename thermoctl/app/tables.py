@@ -1,0 +1,210 @@
+"""The tables of a configuration: typed, with units in the names, unknown keys refused."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from thermoctl.signals import Mode
+
+Celsius = Annotated[float, Field(ge=-273.15, le=2000.0, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Table(BaseModel):
+    """A table whose keys are all known; frozen once it is read."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+
+class Options(BaseModel):
+    """A table that names a ``kind``; its other keys are the options of that kind."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    kind: str = Field(description="Which one; `thermoctl drivers` and the manual list them.")
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Every key but ``kind``."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+class SensorTable(Table):
+    """Table ``[loops.NAME.sensor]``: which input, and what its counts mean."""
+
+    board: str = Field(description="Name of the board in [boards.NAME].")
+    input: str = Field("temperature", description="Channel of the board.")
+    curve: Literal["lm335", "lm35", "tmp36", "pt100", "pt1000", "ntc", "linear"] = Field(
+        "lm335", description="Law from volts to degC."
+    )
+    reference_v: Positive = Field(5.0, description="Volts at full scale of the converter.")
+    calibration_gain: Positive = Field(1.0, description="One-point calibration: a factor on volts.")
+    calibration_offset_k: Finite = Field(0.0, description="Added after the curve.")
+    pull_up_ohm: Positive | None = Field(None, description="Series resistor of pt100, pt1000, ntc.")
+    supply_v: Positive | None = Field(None, description="Voltage across it; reference_v if absent.")
+    beta_k: Positive = Field(3950.0, description="Beta of an ntc.")
+    r25_ohm: Positive = Field(10_000.0, description="Resistance of an ntc at 25 degC.")
+    kelvin_per_v: Finite = Field(100.0, description="Slope of a linear sensor.")
+    zero_v_c: Finite = Field(0.0, description="Temperature of a linear sensor at 0 V.")
+    open_above: Fraction = Field(0.98, description="Fraction of full scale that means: open.")
+    short_below: Fraction = Field(0.02, description="Fraction of full scale that means: short.")
+
+    @model_validator(mode="after")
+    def _resistive_sensors_need_a_pull_up(self) -> Self:
+        if self.curve in ("pt100", "pt1000", "ntc") and self.pull_up_ohm is None:
+            raise ValueError(
+                f"curve {self.curve!r} needs pull_up_ohm, the resistor it is read with"
+            )
+        return self
+
+
+class ActuatorTable(Table):
+    """Table ``[loops.NAME.actuator]``: which output, and how power becomes its drive."""
+
+    board: str = Field(description="Name of the board in [boards.NAME].")
+    output: str = Field("heater", description="Channel of the board.")
+    law: Literal["linear", "square", "phase-angle", "burst"] = Field(
+        "linear", description="linear: the board takes power itself; square: P ~ V^2; ..."
+    )
+    cycles: int = Field(50, ge=1, description="Mains cycles of one burst, for law burst.")
+
+
+class GuardsTable(Table):
+    """Table ``[loops.NAME.estimator.guards]``: what keeps learning sound for years."""
+
+    enabled: bool = Field(True, description="False: the bare law, as printed.")
+    covariance_max: Positive | None = Field(
+        None, description="Cap on the diagonal of P; P0 when absent."
+    )
+    excitation_min: Positive | None = Field(
+        None,
+        description="Learn only while the regressor moves more than this; when absent 0.1 for "
+        "structure arx, and off for known-gain, whose learning at rest is its integral action.",
+    )
+    robust_R2: bool = Field(  # noqa: N815 - R2 keeps its letter
+        True, description="Estimate R2 beside a Kalman filter instead of taking it as given."
+    )
+
+
+class EstimatorTable(Options):
+    """Table ``[loops.NAME.estimator]``: the law that learns the model; other keys are its own."""
+
+    kind: str = Field("ckf", description="ckf, nkf, rls, vff, or one from a plug-in.")
+    P0: Positive = Field(1.0, description="Variance of the parameters at the start.")
+    theta0: tuple[Finite, ...] | None = Field(None, description="Parameters at the start.")
+    guards: GuardsTable = Field(default_factory=GuardsTable)
+
+
+class ModelTable(Table):
+    """Table ``[loops.NAME.model]``: the structure that is learnt."""
+
+    structure: Literal["known-gain", "arx"] = Field(
+        "known-gain",
+        description="known-gain: y(t) = a y(t-1) + b u(t-1), b given; arx: everything learnt.",
+    )
+    gain_k_per_s: Positive = Field(
+        0.0449, description="known-gain: heating rate at full power; 1,500 W in 8 l gives 0.0449."
+    )
+    n: int = Field(2, ge=1, le=10, description="arx: how many past temperatures.")
+    m: int = Field(2, ge=1, le=10, description="arx: how many past powers.")
+    centre_c: Celsius = Field(
+        20.0, description="arx: temperatures are counted from here; where the plant rests at 0 W."
+    )
+    scale_k: Positive = Field(1.0, description="arx: temperatures are counted in units of this.")
+
+
+class LoopTable(Table):
+    """Table ``[loops.NAME]``: what is held, how often, and within which limits."""
+
+    setpoint_c: Celsius = Field(description="Temperature to hold.")
+    trip_above_c: Celsius = Field(description="Heater off for good above this.")
+    trip_below_c: Celsius = Field(-10.0, description="Heater off for good below this.")
+    setpoint_min_c: Celsius | None = Field(None, description="Least set point; the trip if absent.")
+    setpoint_max_c: Celsius | None = Field(
+        None, description="Highest set point; the trip if absent."
+    )
+    period_s: Annotated[float, Field(ge=0.05, le=3600.0)] = Field(
+        1.0, description="Time between two samples."
+    )
+    mode: Mode = Field(Mode.OFF, description="Mode at the first start: off, manual or auto.")
+    resume: bool = Field(False, description="Go on after a restart; else a restarted loop is off.")
+    power_max: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
+        1.0, description="Most power ever given, as a fraction."
+    )
+    rise_per_s: Positive | None = Field(None, description="Most the power may rise in a second.")
+    jump_k: Positive = Field(1.0, description="A reading farther off than this may be an outlier.")
+    sensor: SensorTable | None = None
+    actuator: ActuatorTable | None = None
+    controller: Options = Field(
+        default_factory=lambda: Options.model_validate(
+            {"kind": "self-tuning-mv", "reference_time_s": 60.0}
+        ),
+        description="Law in charge in mode auto: a kind, or a table with a kind and its options.",
+    )
+    model: ModelTable = Field(default_factory=ModelTable)
+    estimator: EstimatorTable = Field(default_factory=EstimatorTable)
+
+    @field_validator("controller", mode="before")
+    @classmethod
+    def _a_kind_alone_is_a_controller(cls, value: Any) -> Any:
+        return {"kind": value} if isinstance(value, str) else value
+
+    @field_validator("mode")
+    @classmethod
+    def _no_program_yet(cls, value: Mode) -> Mode:
+        if value is Mode.PROGRAM:
+            raise ValueError("expected off, manual or auto: a loop cannot start in a program")
+        return value
+
+    @model_validator(mode="after")
+    def _setpoint_within_limits_within_trips(self) -> Self:
+        low_c, high_c = self.setpoint_range_c
+        if not self.trip_below_c < self.trip_above_c:
+            raise ValueError(
+                f"trip_below_c {self.trip_below_c:g} must lie below "
+                f"trip_above_c {self.trip_above_c:g}"
+            )
+        if not self.trip_below_c <= low_c <= high_c <= self.trip_above_c:
+            raise ValueError(
+                f"set points from {low_c:g} to {high_c:g} must lie between the trips "
+                f"{self.trip_below_c:g} and {self.trip_above_c:g}"
+            )
+        if not (low_c <= self.setpoint_c <= high_c and self.setpoint_c < self.trip_above_c):
+            raise ValueError(
+                f"setpoint_c {self.setpoint_c:g} must lie from {low_c:g} to {high_c:g} and "
+                f"below trip_above_c {self.trip_above_c:g}"
+            )
+        return self
+
+    @property
+    def setpoint_range_c(self) -> tuple[float, float]:
+        """Least and highest set point that is accepted, in degC."""
+        low_c = self.trip_below_c if self.setpoint_min_c is None else self.setpoint_min_c
+        high_c = self.trip_above_c if self.setpoint_max_c is None else self.setpoint_max_c
+        return low_c, high_c
+
+    @property
+    def rise_limit_per_s(self) -> float:
+        """Most the power may rise in a second, infinite when not limited."""
+        return math.inf if self.rise_per_s is None else self.rise_per_s
+
+
+class HistoryTable(Table):
+    """Table ``[history]``: the record of every step."""
+
+    enabled: bool = Field(True, description="Write every step into the state directory.")
+    file: str = Field("history.sqlite", min_length=1, description="Name, or an absolute path.")
+
+
+class ServiceTable(Table):
+    """Table ``[service]``: how the daemon behaves."""
+
+    accept_no_dead_man: bool = Field(
+        False, description="Run a board that cannot switch its output off by itself."
+    )

@@ -1,0 +1,40 @@
+"""Where in a TOML file a key stands, so that an error can name its line.
+
+The standard library's parser forgets lines. This scan knows table headers and keys at the start of
+a line, which is how configurations are written; for anything else the line of the table is named.
+"""
+
+from __future__ import annotations
+
+import re
+
+_HEADER = re.compile(r"^\s*\[+\s*(?P<path>[^\[\]]+?)\s*\]+\s*(#.*)?$")
+_KEY = re.compile(r"^\s*(?P<path>[A-Za-z0-9_\-\"'.]+)\s*=")
+
+Path = tuple[str, ...]
+
+
+def places(text: str) -> dict[Path, int]:
+    """Return the line number, from 1, of every table and key of `text` by its path."""
+    found: dict[Path, int] = {}
+    table: Path = ()
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := _HEADER.match(line):
+            table = _split(header["path"])
+            found.setdefault(table, number)
+        elif key := _KEY.match(line):
+            found.setdefault(table + _split(key["path"]), number)
+    return found
+
+
+def line_of(found: dict[Path, int], path: Path) -> int | None:
+    """Return the line of `path`, or of the nearest table around it that is written down."""
+    while path:
+        if path in found:
+            return found[path]
+        path = path[:-1]
+    return None
+
+
+def _split(path: str) -> Path:
+    return tuple(part.strip().strip("\"'") for part in path.split("."))

@@ -1,0 +1,42 @@
+"""The power that has been holding the set point, whatever the controller and its model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+NEAR_K = 0.5
+"""The plant is being held while its temperature is this close to the set point."""
+KNOWN_AFTER_S = 60.0
+MEMORY_S = 120.0
+
+
+@dataclass(frozen=True, slots=True)
+class Holding:
+    """Mean of the applied power while the plant was held without a break.
+
+    Parameters
+    ----------
+    power : float
+        The mean, a fraction in [0, 1].
+    held_s : float
+        For how long the plant has been held.
+    """
+
+    power: float = 0.0
+    held_s: float = 0.0
+
+    def after(self, deviation_k: float, applied: float, interval_s: float) -> Holding:
+        """Return the mean after `applied` was given for `interval_s`; NaN deviation: no sample."""
+        if math.isnan(deviation_k):
+            return self
+        if abs(deviation_k) > NEAR_K:
+            return Holding()
+        held_s = self.held_s + interval_s
+        share = min(1.0, interval_s / min(held_s, MEMORY_S))
+        return Holding(self.power + share * (applied - self.power), held_s)
+
+    @property
+    def known(self) -> float | None:
+        """The holding power, None until the plant has been held for a minute."""
+        return self.power if self.held_s >= KNOWN_AFTER_S else None

@@ -1,0 +1,99 @@
+"""The limits a supervisor keeps, and how fast its states give way to each other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from thermoctl.errors import Refused
+from thermoctl.quantities import is_finite_number
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a loop may never leave, whatever its controller asks for.
+
+    Parameters
+    ----------
+    trip_above_c, trip_below_c : float
+        Heater off for good beyond these (one reading: power 0; the second: latched).
+    setpoint_min_c, setpoint_max_c : float
+        Range of set points that are accepted, inside the trips.
+    period_s : float
+        Nominal time between two samples.
+    power_max : float
+        Most power ever given, a fraction in (0, 1].
+    rise_per_s : float
+        Most the power may rise in a second; falling is never slowed. Infinite: no limit.
+    jump_k : float
+        A reading farther than this from the last good one, and far from the usual step between
+        readings as well, is an outlier.
+    applied_tolerance : float
+        The hardware may take this much more than it was told before it counts as a fault.
+    """
+
+    trip_above_c: float
+    trip_below_c: float
+    setpoint_min_c: float
+    setpoint_max_c: float
+    period_s: float = 1.0
+    power_max: float = 1.0
+    rise_per_s: float = math.inf
+    jump_k: float = 1.0
+    applied_tolerance: float = 0.1
+
+    HOLD_S = 3.0
+    """HOLD keeps the last output no longer than this."""
+    RIDE_S = 60.0
+    """RIDE lets the model steer no longer than this."""
+    RIDE_ALARM_S = 5.0
+    RETURN_S = 30.0
+    """Good readings for this long end SAFE."""
+    OPEN_COUNT = 3
+    OPEN_WINDOW_S = 600.0
+    """So many open circuits within this time latch."""
+    OUTLIERS = 2
+    """So many outliers in a row are ignored; the next one that agrees with them is the truth."""
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if each.name != "rise_per_s" and not is_finite_number(value):
+                raise ValueError(f"{each.name} must be a finite number, got {value!r}")
+        if not self.trip_below_c <= self.setpoint_min_c <= self.setpoint_max_c <= self.trip_above_c:
+            raise ValueError(
+                "expected trip_below_c <= setpoint_min_c <= setpoint_max_c <= trip_above_c, got "
+                f"{self.trip_below_c}, {self.setpoint_min_c}, {self.setpoint_max_c}, "
+                f"{self.trip_above_c}"
+            )
+        for name in ("period_s", "rise_per_s", "jump_k", "applied_tolerance", "power_max"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)!r}")
+        if self.power_max > 1.0:
+            raise ValueError(f"power_max is a fraction of full power, got {self.power_max!r}")
+
+    @property
+    def hold_s(self) -> float:
+        """How long the last output is kept without a reading; a slow loop may miss one sample."""
+        return max(self.HOLD_S, 1.5 * self.period_s)
+
+    def valid_until_s(self, t_s: float) -> float:
+        """Return when a command given at `t_s` expires: half a period late, and one second."""
+        return t_s + 1.5 * self.period_s + 1.0
+
+    def accept_setpoint(self, value: object) -> float:
+        """Return `value` as a set point in degC; raise `Refused` naming the range if it is none."""
+        allowed = f"a set point from {self.setpoint_min_c:g} to {self.setpoint_max_c:g} degC"
+        if not is_finite_number(value):
+            raise Refused(f"expected {allowed}, got {value!r}")
+        number = float(value)  # type: ignore[arg-type]
+        if not self.setpoint_min_c <= number <= self.setpoint_max_c:
+            raise Refused(f"expected {allowed}, got {number:g}")
+        return number
+
+
+def accept_power(value: object) -> float:
+    """Return `value` as a power in [0, 1]; raise `Refused` if it is none."""
+    if not is_finite_number(value) or not 0.0 <= float(value) <= 1.0:  # type: ignore[arg-type]
+        raise Refused(f"expected a power from 0 to 1, got {value!r}")
+    return float(value)  # type: ignore[arg-type]

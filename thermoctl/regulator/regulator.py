@@ -1,0 +1,324 @@
+"""One measurement in, one step out.
+
+Anything can drive a regulator: the loop, a replay, a study, somebody else's simulator. It knows no
+clock, no hardware and no file. The walk of a sample through it is `Regulator.step`, top to bottom.
+"""
+
+from __future__ import annotations
+
+import math
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+from thermoctl.errors import Refused
+from thermoctl.estimation.identifier import Identifier, IdentifierBelief
+from thermoctl.ports import Controller, Situation
+from thermoctl.quantities import clamp, is_finite_number
+from thermoctl.regulator.holding import Holding
+from thermoctl.regulator.judge import Verdict
+from thermoctl.regulator.limits import Limits, accept_power
+from thermoctl.regulator.supervisor import Supervisor
+from thermoctl.signals import (
+    Acknowledge,
+    Alarm,
+    Beliefs,
+    Command,
+    Event,
+    ManualPower,
+    Measurement,
+    Mode,
+    Request,
+    SetPoint,
+    State,
+    Step,
+)
+
+_NAN_IN_A_ROW = 3
+_EARLIER_TEXT = "latched before this start: {}"
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What a regulator is made of; every part is frozen.
+
+    Parameters
+    ----------
+    limits : Limits
+        What may never be left.
+    identifier : Identifier
+        The model that is learnt beside every controller, in every mode.
+    controller : Controller
+        The law in charge in mode AUTO.
+    setpoint_c : float
+        Set point at the start, in degC.
+    mode : Mode
+        Mode at the start.
+    """
+
+    limits: Limits
+    identifier: Identifier
+    controller: Controller
+    setpoint_c: float
+    mode: Mode = Mode.OFF
+
+
+class Regulator:
+    """Keeps one loop: what the operator wants, what is believed, what the heater may do.
+
+    Parameters
+    ----------
+    plan : Plan
+        Its parts.
+    latched : Alarm, optional
+        A latch of an earlier run; the heater stays off until it is acknowledged.
+    """
+
+    def __init__(self, plan: Plan, latched: Alarm | None = None) -> None:
+        self._plan = plan
+        self._limits = plan.limits
+        self._setpoint_c = plan.limits.accept_setpoint(plan.setpoint_c)
+        self._mode = plan.mode
+        self._events: list[tuple[str, dict[str, object]]] = []
+        self._supervisor = Supervisor(plan.limits, self._emit)
+        self._identified: IdentifierBelief = plan.identifier.start()
+        self._foreseen: IdentifierBelief | None = None
+        self._holding = Holding()
+        self._control: Any = plan.controller.start()
+        self._t_s: float | None = None
+        self._manual_power = 0.0
+        self._command = Command(0.0, -math.inf, "start")
+        self._applied: float | None = None
+        self._unknown_powers = 0
+        if latched is not None:
+            text = _EARLIER_TEXT.format(latched.text)
+            self._supervisor.latch(latched.code, latched.fault, text, 0.0)
+
+    # -- what the operator wants -----------------------------------------------------------------
+
+    @property
+    def mode(self) -> Mode:
+        """The operator's mode."""
+        return self._mode
+
+    @property
+    def setpoint_c(self) -> float:
+        """The set point in degC."""
+        return self._setpoint_c
+
+    def request(self, request: Request) -> None:
+        """Grant a request, or raise `Refused` and change nothing.
+
+        Raises
+        ------
+        Refused
+            The request is none, out of range, or not possible now; the text says what was expected.
+        """
+        match request:
+            case Mode():
+                self._request_mode(request)
+            case SetPoint(value_c):
+                accepted_c = self._limits.accept_setpoint(value_c)
+                self._emit("setpoint.changed", before_c=self._setpoint_c, after_c=accepted_c)
+                self._setpoint_c = accepted_c
+            case ManualPower(power):
+                self._manual_power = accept_power(power)
+            case Acknowledge(code):
+                self._supervisor.acknowledge(code)
+            case _:
+                raise Refused(
+                    f"expected a Mode, SetPoint, ManualPower or Acknowledge, got {request!r}"
+                )
+
+    def _request_mode(self, mode: Mode) -> None:
+        if mode is Mode.PROGRAM:
+            raise Refused("expected off, manual or auto: this loop has no program")
+        if mode is self._mode:
+            return
+        if mode is Mode.MANUAL:  # bumpless: manual goes on with what is given now
+            self._manual_power = self._applied_power()
+        self._emit("mode.changed", before=self._mode.value, after=mode.value)
+        self._mode = mode
+
+    # -- the walk of a sample --------------------------------------------------------------------
+
+    def step(self, measurement: Measurement) -> Step:
+        """Return what is made of `measurement`; never raises, whatever a sensor can produce."""
+        t_s, interval_s = self._time(measurement.t_s)
+        applied = self._applied_power()
+        verdict = self._supervisor.judge(measurement, t_s)
+        temperature_c = float(measurement.temperature_c) if verdict is Verdict.GOOD else math.nan
+        self._identify(temperature_c, applied * interval_s / self._limits.period_s, t_s)
+        self._holding = self._holding.after(temperature_c - self._setpoint_c, applied, interval_s)
+        situation = self._situation(t_s, interval_s, applied)
+        beliefs = self._beliefs(situation)
+        state = self._supervisor.rule(t_s, self._ride_s(situation, beliefs))
+        asked, reason = self._ask(situation, state, beliefs)
+        self._command = self._supervisor.bound(asked, reason, t_s, interval_s)
+        self._notice_unknown_power(t_s)
+        self._applied = None
+        return self._finish(measurement, situation, beliefs)
+
+    def applied(self, power: float) -> None:
+        """Tell which power the actuator took; when never told, it took the command's."""
+        known = is_finite_number(power)
+        taken = float(power) if known else math.nan
+        self._supervisor.check_applied(self._command.power, taken, self._t_s or 0.0)
+        if known:
+            self._applied = clamp(taken, 0.0, 1.0)
+
+    def fault(self, code: str, fault: int | None, text: str) -> None:
+        """Report that something outside failed (a board, an output): SAFE from the next step on.
+
+        Parameters
+        ----------
+        code : str
+            Name of the alarm, such as ``output.refused``.
+        fault : int or None
+            Row of the fault table.
+        text : str
+            What was expected and what came.
+        """
+        self._supervisor.fail(code, fault, text, self._t_s or 0.0)
+        self._applied = 0.0
+
+    def _applied_power(self) -> float:
+        return self._command.power if self._applied is None else self._applied
+
+    def _time(self, t_s: float) -> tuple[float, float]:
+        """Return the time of this step, and since the last; time that stands still goes on anyway.
+
+        Patience with a lost sensor is counted in this time, so it must never stop.
+        """
+        period_s = self._limits.period_s
+        before_s = self._t_s
+        if not is_finite_number(t_s):
+            t_s = 0.0 if before_s is None else before_s + period_s
+        elif before_s is not None and t_s <= before_s:
+            t_s = before_s + period_s
+        self._t_s = float(t_s)
+        return self._t_s, period_s if before_s is None else self._t_s - before_s
+
+    def _identify(self, temperature_c: float, applied: float, t_s: float) -> None:
+        """Learn from the sample; a belief that is not finite is never kept.
+
+        Without a reading, what the model foresees is kept beside the belief, for RIDE to act on.
+        """
+        before, identifier = self._identified, self._plan.identifier
+        seen = not math.isnan(temperature_c)
+        last = before if self._foreseen is None else self._foreseen
+
+        def learn() -> tuple[IdentifierBelief, IdentifierBelief | None]:
+            foreseen = None if seen else identifier.foresee(last, applied)
+            return identifier.update(before, temperature_c, applied), foreseen
+
+        after, self._foreseen = self._guarded(learn, (before, None), "estimator.failed", t_s)
+        if math.isfinite(float(after.estimate.theta.sum() + after.estimate.P.sum())):
+            self._identified = after
+        else:
+            text = "expected finite parameters, went back to the last good ones"
+            self._supervisor.fail("estimator.reset", 11, text, t_s)
+
+    def _situation(self, t_s: float, interval_s: float, applied: float) -> Situation:
+        known = self._identified if self._foreseen is None else self._foreseen
+        return Situation(
+            t_s,
+            interval_s,
+            float(known.y_past_c[0]),
+            self._setpoint_c,
+            applied,
+            known.estimate,
+            known.y_past_c,
+            known.u_past,
+        )
+
+    def _ride_s(self, situation: Situation, beliefs: Beliefs) -> float:
+        """Return how long the model may steer without a sensor: 0 until it is known."""
+        known = beliefs.holding_power is not None and math.isfinite(situation.temperature_c)
+        return self._plan.controller.ride_s if known and self._mode is Mode.AUTO else 0.0
+
+    def _ask(self, situation: Situation, state: State, beliefs: Beliefs) -> tuple[float, str]:
+        """Return the power that mode, state and controller ask for, and who asked."""
+        if self._mode is Mode.OFF:
+            return 0.0, "off"
+        if state is State.HOLD:
+            return self._supervisor.last_power, "hold"
+        if self._mode is Mode.MANUAL:
+            return self._manual_power, "manual"
+        if state in (State.SAFE, State.LATCHED):
+            return 0.0, state.value
+        if not math.isfinite(situation.temperature_c):
+            return 0.0, "unknown"
+        asked = self._decide(situation)
+        if state is State.RIDE:
+            return min(asked, beliefs.holding_power or 0.0), "ride"
+        return asked, "control"
+
+    def _decide(self, situation: Situation) -> float:
+        before = self._control
+        self._control, asked = self._guarded(
+            lambda: self._plan.controller.decide(before, situation),
+            (before, 0.0),
+            "controller.failed",
+            situation.t_s,
+        )
+        return asked
+
+    def _beliefs(self, situation: Situation) -> Beliefs:
+        """Return the controller's words; where its model is vague, holding power as observed."""
+        beliefs = self._guarded(
+            lambda: self._plan.controller.beliefs(self._control, situation),
+            Beliefs(),
+            "controller.failed",
+            situation.t_s,
+        )
+        if beliefs.holding_power is None and self._holding.known is not None:
+            return replace(beliefs, holding_power=self._holding.known)
+        return beliefs
+
+    def _guarded(self, call: Callable[[], T], otherwise: T, code: str, t_s: float) -> T:
+        """Return what a law returns; one that raises costs power 0 in this cycle, never the loop.
+
+        Laws come from entry points, so anything may come out of them: this is the one place below
+        the loop where every exception is caught.
+        """
+        try:
+            return call()
+        except Exception as error:  # noqa: BLE001 - the boundary to third-party laws
+            text = f"expected a result, got {type(error).__name__}: {error}"
+            self._emit(code, text=text, trace=traceback.format_exc())
+            self._supervisor.fail(code, 58, text, t_s)
+            return otherwise
+
+    def _notice_unknown_power(self, t_s: float) -> None:
+        if self._command.reason != "output.nan":
+            self._unknown_powers = 0
+            return
+        self._unknown_powers += 1
+        if self._unknown_powers == 1:
+            self._emit("output.nan", controller=self._plan.controller.name)
+        if self._unknown_powers >= _NAN_IN_A_ROW:
+            text = f"expected a power, got {self._unknown_powers} in a row that are none"
+            self._supervisor.fail("output.nan", 11, text, t_s)
+
+    def _finish(self, measurement: Measurement, situation: Situation, beliefs: Beliefs) -> Step:
+        events = tuple(Event(situation.t_s, name, fields) for name, fields in self._events)
+        self._events.clear()
+        return Step(
+            t_s=situation.t_s,
+            measurement=measurement,
+            mode=self._mode,
+            state=self._supervisor.state,
+            setpoint_c=self._setpoint_c,
+            command=self._command,
+            controller=self._plan.controller.name,
+            estimate=self._identified.estimate,
+            beliefs=beliefs,
+            alarms=self._supervisor.alarms.rows(),
+            events=events,
+        )
+
+    def _emit(self, name: str, **fields: object) -> None:
+        self._events.append((name, fields))

@@ -1,0 +1,244 @@
+"""Decides what the heater may do, whatever the operator wants and the controller asks for.
+
+The states and what moves them (times are those of `thermoctl.regulator.limits.Limits`):
+
+==========  ======================================  ==========================================
+state       power                                   left for
+==========  ======================================  ==========================================
+RUN         what mode and controller ask, bounded   RIDE, HOLD, SAFE, LATCHED
+RIDE        from prediction, at most holding power  RUN at a good reading, SAFE when too long
+HOLD        the last one                            RUN at a good reading, SAFE when too long
+SAFE        0                                       RUN after 30 s of good readings
+LATCHED     0                                       SAFE when acknowledged and the cause gone
+==========  ======================================  ==========================================
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+
+from thermoctl.errors import Refused
+from thermoctl.quantities import clamp
+from thermoctl.regulator.alarms import AlarmRegister
+from thermoctl.regulator.judge import Judged, Verdict, judge
+from thermoctl.regulator.limits import Limits
+from thermoctl.signals import Alarm, Command, Measurement, State
+
+_CIRCUITS = {Verdict.OPEN: ("sensor.open", 1), Verdict.SHORT: ("sensor.short", 2)}
+_TRIPS = {
+    Verdict.OVER: ("trip.over_temperature", 9),
+    Verdict.UNDER: ("trip.under_temperature", None),
+}
+_FAILED_IN_A_ROW = 2
+
+Emit = Callable[..., None]
+
+
+class Supervisor:
+    """Judges readings, keeps the state, bounds the power, raises and clears alarms.
+
+    Parameters
+    ----------
+    limits : Limits
+        What may never be left.
+    emit : callable
+        Called as ``emit(name, **fields)`` for every change worth a line in the journal.
+    """
+
+    def __init__(self, limits: Limits, emit: Emit) -> None:
+        self.limits = limits
+        self.alarms = AlarmRegister()
+        self.state = State.RUN
+        self._emit = emit
+        self._judged = Judged()
+        self._reading = math.nan
+        self._good_since_s: float | None = None
+        self._last_good_s: float | None = None
+        self._tripping: Verdict | None = None
+        self._opened_s: deque[float] = deque(maxlen=limits.OPEN_COUNT)
+        self._excess = 0
+        self._last_power = 0.0
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the last reading was worth."""
+        return self._judged.verdict
+
+    # -- judging ---------------------------------------------------------------------------------
+
+    def judge(self, measurement: Measurement, t_s: float) -> Verdict:
+        """Return what `measurement` is worth, and remember it."""
+        before = self._judged.verdict
+        self._judged = judge(self._judged, measurement, self.limits)
+        self._reading = measurement.temperature_c
+        verdict = self._judged.verdict
+        if verdict is Verdict.GOOD:
+            self._last_good_s = t_s
+            self._good_since_s = t_s if self._good_since_s is None else self._good_since_s
+        else:
+            self._good_since_s = None
+        if self._last_good_s is None:
+            self._last_good_s = t_s  # patience with a sensor that never answered starts here
+        if verdict is Verdict.SPIKE:
+            self._emit("sensor.spike", temperature_c=self._reading, ignored=self._judged.outliers)
+        if verdict is Verdict.OPEN and before is not Verdict.OPEN:
+            self._opened_s.append(t_s)
+        return verdict
+
+    # -- state -----------------------------------------------------------------------------------
+
+    def rule(self, t_s: float, ride_s: float) -> State:
+        """Return the state after the last reading; `ride_s` is how long the model may steer."""
+        verdict = self.verdict
+        if verdict in _TRIPS:
+            self._trip(verdict, t_s)
+        elif verdict in _CIRCUITS:
+            self._circuit(verdict, t_s)
+        elif verdict is Verdict.GOOD:
+            self._good(t_s)
+        else:
+            self._blind(t_s, ride_s if verdict is Verdict.MISSING else 0.0)
+        return self.state
+
+    def _trip(self, verdict: Verdict, t_s: float) -> None:
+        code, fault = _TRIPS[verdict]
+        limits = self.limits
+        text = (
+            f"expected {limits.trip_below_c:g} to {limits.trip_above_c:g} degC, "
+            f"got {self._reading:.2f} degC"
+        )
+        if self._tripping is verdict:
+            self.latch(code, fault, text, t_s)
+        else:
+            self._tripping = verdict
+            self._raise(code, fault, text, t_s)
+            if self.state in (State.RUN, State.RIDE):
+                self._enter(State.HOLD, code)
+
+    def _circuit(self, verdict: Verdict, t_s: float) -> None:
+        code, fault = _CIRCUITS[verdict]
+        self.fail(
+            code, fault, f"expected a sensor, got {'an ' * (fault == 1)}{verdict} circuit", t_s
+        )
+        times = self._opened_s
+        often = len(times) == times.maxlen and times[-1] - times[0] <= self.limits.OPEN_WINDOW_S
+        if verdict is Verdict.OPEN and often:
+            self.latch(code, fault, f"open {len(times)} times in {times[-1] - times[0]:.0f} s", t_s)
+
+    def _good(self, t_s: float) -> None:
+        self._tripping = None
+        for code in (
+            "sensor.open",
+            "sensor.short",
+            "sensor.missing",
+            *(c for c, _ in _TRIPS.values()),
+        ):
+            self.alarms.clear(code)
+        good_s = t_s - (t_s if self._good_since_s is None else self._good_since_s)
+        if self.state in (State.RIDE, State.HOLD):
+            self._enter(State.RUN, "sensor.good")
+        elif self.state is State.SAFE and good_s >= self.limits.RETURN_S:
+            for row in self.alarms.rows():
+                self.alarms.clear(row.code)
+            self._enter(State.RUN, "sensor.good")
+
+    def _blind(self, t_s: float, ride_s: float) -> None:
+        """No reading to act on: ride on the model, else hold, else be safe."""
+        blind_s = t_s - (t_s if self._last_good_s is None else self._last_good_s)
+        ride_s = min(ride_s, self.limits.RIDE_S)
+        rides, holds = blind_s < ride_s, blind_s < self.limits.hold_s
+        if not (rides or holds) or blind_s >= self.limits.RIDE_ALARM_S:
+            text = f"expected a reading every {self.limits.period_s:g} s, none for {blind_s:.0f} s"
+            self._raise("sensor.missing", 16, text, t_s, priority=1 if not rides else 2)
+        if self.state in (State.SAFE, State.LATCHED):
+            return
+        self._enter(
+            State.RIDE if rides else State.HOLD if holds else State.SAFE,
+            f"sensor.{self.verdict.value}",
+        )
+
+    def fail(self, code: str, fault: int | None, text: str, t_s: float) -> None:
+        """Go to SAFE for the fault `code`; good readings for 30 s end it."""
+        self._raise(code, fault, text, t_s)
+        self._good_since_s = None
+        if self.state is not State.LATCHED:
+            self._enter(State.SAFE, code)
+
+    def latch(self, code: str, fault: int | None, text: str, t_s: float) -> None:
+        """Go to LATCHED for the fault `code`; only an acknowledgement ends it."""
+        self.alarms.set(Alarm(code, fault, 1, t_s, text, latched=True))
+        self._enter(State.LATCHED, code)
+
+    def acknowledge(self, code: str | None) -> None:
+        """Acknowledge an alarm, or all; raise `Refused` while the cause of a latch persists."""
+        latched = self.alarms.latched()
+        if latched is not None and code in (None, latched.code):
+            if self.verdict in _CIRCUITS or self.verdict in _TRIPS:
+                raise Refused(f"{latched.code} still stands: {latched.text}")
+            self._tripping = None
+            self._opened_s.clear()
+            self._enter(State.SAFE, "latch.cleared")
+        for each in self.alarms.acknowledge(code):
+            self._emit("alarm.acknowledged", code=each)
+
+    # -- power -----------------------------------------------------------------------------------
+
+    def bound(self, asked: float, reason: str, t_s: float, interval_s: float) -> Command:
+        """Return the command for the power a controller `asked` for; NaN becomes 0.
+
+        The one place where limits hold. Falling is never slowed; nothing at all passes in SAFE,
+        LATCHED or while a trip waits to be confirmed.
+        """
+        if self.state in (State.SAFE, State.LATCHED):
+            power, reason = 0.0, self._why_off()
+        elif self._tripping is not None:
+            power, reason = 0.0, _TRIPS[self._tripping][0]
+        elif not math.isfinite(asked):
+            power, reason = 0.0, "output.nan"
+        else:
+            power, reason = self._limited(asked, reason, interval_s)
+        self._last_power = power
+        return Command(power, self.limits.valid_until_s(t_s), reason)
+
+    @property
+    def last_power(self) -> float:
+        """The power of the last command."""
+        return self._last_power
+
+    def _limited(self, asked: float, reason: str, interval_s: float) -> tuple[float, str]:
+        power = clamp(asked, 0.0, self.limits.power_max)
+        if power != asked:
+            reason = "limit.high" if asked > power else "limit.low"
+        step = self.limits.rise_per_s * interval_s
+        if power > self._last_power + step:
+            return self._last_power + step, "limit.rate"
+        return power, reason
+
+    def _why_off(self) -> str:
+        rows = self.alarms.rows()
+        return next((row.code for row in rows if row.latched or row.active), self.state.value)
+
+    def check_applied(self, commanded: float, applied: float, t_s: float) -> None:
+        """Compare what the hardware took with the command: more, twice in a row, is a fault."""
+        excess = not applied <= commanded + self.limits.applied_tolerance
+        self._excess = self._excess + 1 if excess else 0
+        if self._excess >= _FAILED_IN_A_ROW:
+            text = (
+                f"expected at most {commanded:.3f} of full power, the output reports {applied:.3f}"
+            )
+            self.fail("output.readback", 25, text, t_s)
+
+    # -- words -----------------------------------------------------------------------------------
+
+    def _raise(
+        self, code: str, fault: int | None, text: str, t_s: float, priority: int = 1
+    ) -> None:
+        if self.alarms.set(Alarm(code, fault, priority, t_s, text)):
+            self._emit(code, text=text)
+
+    def _enter(self, state: State, why: str) -> None:
+        if state is not self.state:
+            self._emit("state.changed", before=self.state.value, after=state.value, why=why)
+            self.state = state
