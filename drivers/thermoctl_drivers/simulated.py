@@ -1,0 +1,283 @@
+"""A board that is wired to a simulated tank: for trying things out, for tests and for teaching.
+
+The tank's time is the clock's: every `read` and `write` first lets the tank catch up. On a
+simulated clock an hour takes a fraction of a second; on a real one the tank lives in real time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from thermoctl.errors import BoardConfigError, LinkError, Refused
+from thermoctl.plant.acquisition import Acquisition, AcquisitionParameters
+from thermoctl.plant.disturbances import disturb
+from thermoctl.plant.parameters import TankParameters
+from thermoctl.plant.power_stage import STAGES
+from thermoctl.plant.tank import Tank
+from thermoctl.plant.tolerances import specimen
+from thermoctl.ports import Capabilities, Clock, Health, Identity, Link
+from thermoctl.quantities import clamp
+from thermoctl.signals import RawSample
+
+INPUT = "temperature"
+OUTPUT = "heater"
+MAINS_PERIODS_A_BURST = 2
+
+
+class SimulatedSettings(BaseModel):
+    """Table ``[boards.NAME]`` with ``kind = "simulated"``: the tank and the board's converters."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    kind: Literal["simulated"] = "simulated"
+    volume_l: float = Field(8.0, ge=0.5, le=200.0, description="Water in the tank, in l.")
+    heater_w: float = Field(1500.0, ge=50.0, le=5000.0, description="Rated power, in W.")
+    ambient_c: float = Field(22.0, ge=0.0, le=50.0, description="The room, in degC.")
+    initial_c: float = Field(25.0, ge=1.0, le=95.0, description="The water at the start, in degC.")
+    ice_kg: float | None = Field(
+        None,
+        ge=0.0,
+        le=500.0,
+        description="Ice around the tank, in kg; 0: it stands in air; left out: as the rig has.",
+    )
+    element_lag_s: float = Field(13.5, ge=2.0, le=120.0, description="Lag of the heater, in s.")
+    transport_s: float | None = Field(
+        None,
+        ge=0.0,
+        le=30.0,
+        description="Time from heater to sensor, in s; left out: by the size of the tank.",
+    )
+    sensor_lag_s: float = Field(6.0, ge=0.5, le=120.0, description="Lag of the sensor, in s.")
+    tolerances: float = Field(
+        0.0, ge=0.0, le=0.3, description="Spread of what varies between specimens; 0.1 is 10 %."
+    )
+    bits: int = Field(10, ge=8, le=24, description="Resolution of the A/D converter, in bits.")
+    reference_v: float = Field(5.0, ge=3.0, le=10.0, description="A/D full scale, in V.")
+    conversions: int = Field(
+        32, ge=1, le=1000, description="Conversions in a burst, spread over two mains periods."
+    )
+    noise_mv: float = Field(1.0, ge=0.0, le=100.0, description="Noise per conversion, rms in mV.")
+    pickup_mv: float = Field(3.0, ge=0.0, le=100.0, description="Mains pickup, amplitude in mV.")
+    mains_hz: float = Field(50.0, ge=45.0, le=65.0, description="Mains frequency, in Hz.")
+    power_stage: Literal["square", "phase-angle", "burst", "linear"] = Field(
+        "square", description="How the heater's power follows from the drive."
+    )
+    dac_bits: int = Field(12, ge=6, le=24, description="Resolution of the output, in bits.")
+    dead_man_s: float = Field(
+        2.5, ge=0.1, le=60.0, description="Heater off so long after the last write, in s."
+    )
+    seed: int = Field(1, ge=0, description="Seed of all randomness; equal seeds, equal runs.")
+
+
+class SimulatedBoard:
+    """One input and one output on a simulated tank; a `Board` that is `Simulated`.
+
+    The input ``temperature`` is the sum of a burst of conversions of an LM335. The output
+    ``heater`` is the drive of the power stage, a fraction in [0, 1].
+
+    Parameters
+    ----------
+    settings : SimulatedSettings
+        The tank and the converters.
+    link : Link or None
+        Not used; there is no wire.
+    clock : Clock
+        The time the tank follows.
+
+    Raises
+    ------
+    BoardConfigError
+        When the settings do not make a tank together.
+    """
+
+    Settings: ClassVar[type[SimulatedSettings]] = SimulatedSettings
+    capabilities: Capabilities = Capabilities(dead_man=True)
+
+    def __init__(self, settings: SimulatedSettings, link: Link | None, clock: Clock) -> None:
+        del link  # every driver is built alike; this one has nothing to talk to
+        tank_rng, specimen_rng, input_rng = np.random.default_rng(settings.seed).spawn(3)
+        try:
+            parameters = specimen(_tank_parameters(settings), specimen_rng, settings.tolerances)
+            acquisition = _acquisition_parameters(settings)
+        except ValueError as error:
+            raise BoardConfigError(str(error)) from error
+        self._settings, self._clock = settings, clock
+        self._tank = Tank(parameters, tank_rng, STAGES[settings.power_stage])
+        self._acquisition = Acquisition(acquisition, input_rng)
+        self._full_scale = float(acquisition.full_scale)
+        self._drive_steps = 2**settings.dac_bits - 1
+        self._is_open = False
+        self._now_s = math.nan
+        self._drive = 0.0
+        self._armed_until_s = -math.inf
+        self._sequence = 0
+        self._last_good_s: float | None = None
+        self._missing = False
+        self._counters = {"reads": 0, "writes": 0, "no_sample": 0, "dead_man": 0}
+
+    def open(self, deadline_s: float) -> Identity:
+        """Switch the heater off and identify the board; at once, whatever `deadline_s`."""
+        del deadline_s
+        now_s = self._clock.now_s()
+        if math.isnan(self._now_s):
+            self._now_s = now_s  # the tank's life begins here
+        self._is_open = True
+        self._catch_up()
+        self._drive = 0.0
+        size = f"{self._settings.volume_l:g} l, {self._settings.heater_w:g} W"
+        return Identity(kind="simulated", name=size, version=str(self._settings.seed))
+
+    def read(self, deadline_s: float) -> Mapping[str, RawSample]:
+        """Convert once, at the clock's time; an input without a sensor is left out.
+
+        Raises
+        ------
+        LinkError
+            When the board is not open.
+        """
+        del deadline_s  # answers at once
+        self._catch_up()
+        self._counters["reads"] += 1
+        volts = self._tank.probe.volts()
+        self._missing = math.isnan(volts)
+        if self._missing:
+            self._counters["no_sample"] += 1
+            return {}
+        self._sequence += 1
+        self._last_good_s = self._now_s
+        counts = self._acquisition.convert(volts)
+        return {INPUT: RawSample(self._now_s, float(counts), self._full_scale, self._sequence)}
+
+    def write(
+        self, outputs: Mapping[str, float], valid_for_s: float, deadline_s: float
+    ) -> Mapping[str, float]:
+        """Set the drive, re-arm the dead-man, and return what the D/A converter took.
+
+        Parameters
+        ----------
+        outputs : mapping
+            ``heater``: drive in [0, 1]; what lies outside is limited, and NaN is 0.
+        valid_for_s : float
+            The heater goes off after this or after ``dead_man_s``, whichever comes first.
+        deadline_s : float
+            Not used; the board takes the drive at once.
+
+        Raises
+        ------
+        LinkError
+            When the board is not open.
+        BoardConfigError
+            When there is no such output; nothing is changed.
+        """
+        del deadline_s
+        for name in outputs:
+            if name != OUTPUT:
+                raise BoardConfigError(f"output must be {OUTPUT!r}, got {name!r}")
+        self._catch_up()
+        self._counters["writes"] += 1
+        if OUTPUT in outputs:
+            wished = clamp(outputs[OUTPUT], 0.0, 1.0)
+            self._drive = round(wished * self._drive_steps) / self._drive_steps
+            self._armed_until_s = self._now_s + clamp(valid_for_s, 0.0, self._settings.dead_man_s)
+        return {OUTPUT: self._drive}
+
+    def health(self) -> Health:
+        """Return counters; ``degraded`` while the sensor is missing, ``down`` when closed."""
+        if not self._is_open:
+            return Health("down", dict(self._counters), self._last_good_s, "board is not open")
+        status, error = ("degraded", "no sample from the sensor") if self._missing else ("ok", None)
+        return Health(status, dict(self._counters), self._last_good_s, error)
+
+    def close(self) -> None:
+        """Switch the heater off and let go; the tank lives on and may be opened again."""
+        if self._is_open:
+            self._catch_up()
+        self._drive = 0.0
+        self._is_open = False
+
+    def truth(self) -> Mapping[str, float]:
+        """Return what no sensor sees, as of the last read or write."""
+        tank, heat = self._tank, self._tank.heat
+        temperatures = tank.temperatures
+        return {
+            "true_temperature_c": tank.temperature_c,
+            "sensor_c": tank.sensor_c,
+            "element_c": temperatures.element_c,
+            "still_c": temperatures.still_c,
+            "heater_w": tank.heater_w,
+            "ice_kg": heat.bath_ice_kg + heat.ice_kg,
+            "water_kg": heat.water_kg,
+            "mains": tank.stage.mains,
+            "stirred": float(tank.stirred),
+            "energy_j": heat.electric_j,
+        }
+
+    def disturb(self, name: str, amount: float | None = None) -> str:
+        """Start the disturbance `name`, one of `thermoctl.plant.disturbances.DISTURBANCES`.
+
+        Raises
+        ------
+        Refused
+            When there is no such disturbance, or the tank cannot do it; nothing has changed.
+        """
+        try:
+            return disturb(self._tank, name, amount)
+        except ValueError as error:
+            raise Refused(str(error)) from error
+
+    def _catch_up(self) -> None:
+        """Let the tank live until now, with the heater off once the dead-man has run out."""
+        if not self._is_open:
+            raise LinkError("board must be opened first, it is closed")
+        now_s = self._clock.now_s()
+        interval_s = max(now_s - self._now_s, 0.0)
+        if interval_s == 0.0:
+            return
+        driven_s = clamp(self._armed_until_s - self._now_s, 0.0, interval_s)
+        self._tank.advance(driven_s, self._drive)
+        if driven_s < interval_s:
+            self._counters["dead_man"] += self._drive > 0.0
+            self._drive = 0.0
+            self._tank.advance(interval_s - driven_s, 0.0)
+        self._acquisition.advance(interval_s)
+        self._now_s = now_s
+
+
+def _tank_parameters(settings: SimulatedSettings) -> TankParameters:
+    """Return the tank that was ordered; raise ValueError where its parts do not fit."""
+    scaled = TankParameters.scaled(
+        settings.volume_l,
+        settings.heater_w,
+        ambient_c=settings.ambient_c,
+        initial_c=settings.initial_c,
+        ice_kg=settings.ice_kg,
+    )
+    transport_s = settings.transport_s
+    return replace(
+        scaled,
+        element=replace(scaled.element, lag_s=settings.element_lag_s),
+        probe=replace(
+            scaled.probe,
+            lag_s=settings.sensor_lag_s,
+            transport_s=scaled.probe.transport_s if transport_s is None else transport_s,
+        ),
+    )
+
+
+def _acquisition_parameters(settings: SimulatedSettings) -> AcquisitionParameters:
+    """Return the converter, its burst laid over whole mains periods."""
+    return AcquisitionParameters(
+        bits=settings.bits,
+        reference_v=settings.reference_v,
+        conversions=settings.conversions,
+        burst_s=MAINS_PERIODS_A_BURST / settings.mains_hz,
+        noise_v=1e-3 * settings.noise_mv,
+        pickup_v=1e-3 * settings.pickup_mv,
+        mains_hz=settings.mains_hz,
+    )

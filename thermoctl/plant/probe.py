@@ -1,0 +1,113 @@
+"""The probe: water that arrives late, a sheath that follows, and what can befall the wire."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from enum import Enum
+
+from numpy.random import Generator
+
+from thermoctl.model.sensor import LM335
+from thermoctl.plant.noise import Normals, Wander
+from thermoctl.plant.parameters import Probe
+
+
+class Wiring(Enum):
+    """How the sensor is connected just now."""
+
+    SOUND = "sound"
+    MISSING = "missing"
+    OPEN = "open"
+    SHORT = "short"
+
+
+class ProbeInTank:
+    """An LM335 in a sheath, downstream of the heater.
+
+    The water it meets left the heater a transport time ago; the sheath follows it with a
+    first-order lag. A parcel never goes back: when the flow slows down the probe waits.
+
+    Parameters
+    ----------
+    parameters : Probe
+        Transport, lag, turbulence and error.
+    initial_c : float
+        Temperature of everything before the start, in degC.
+    rng : Generator
+        Source of the turbulence.
+    """
+
+    def __init__(self, parameters: Probe, initial_c: float, rng: Generator) -> None:
+        self._parameters = parameters
+        self._turbulence = Wander(Normals(rng), parameters.turbulence_k, parameters.turbulence_s)
+        self._t_s = 0.0
+        self._past: deque[tuple[float, float]] = deque([(-math.inf, initial_c), (0.0, initial_c)])
+        self._met_c = initial_c
+        self._sheath_c = initial_c
+        self._step_s = 0.0
+        self._follow = 0.0
+        self._spike_k = 0.0
+        self._wiring = Wiring.SOUND
+        self._wiring_until_s = 0.0
+
+    @property
+    def sheath_c(self) -> float:
+        """Temperature of the sensing element in degC, before any error of the sensor."""
+        return self._sheath_c
+
+    @property
+    def wiring(self) -> Wiring:
+        """How the sensor is connected at this time."""
+        return self._wiring if self._t_s < self._wiring_until_s else Wiring.SOUND
+
+    def advance(self, step_s: float, water_c: float, *, stirred: bool) -> None:
+        """Let `step_s` pass, at the end of which the water at the heater has `water_c`."""
+        probe = self._parameters
+        self._t_s += step_s
+        self._past.append((self._t_s, water_c))
+        delay_s = probe.transport_s * (1.0 if stirred else probe.still_transport_factor)
+        met_c = self._arriving(self._t_s - delay_s) + self._turbulence.advance(step_s)
+        if step_s != self._step_s:
+            self._step_s, self._follow = step_s, -math.expm1(-step_s / probe.lag_s)
+        # The exact answer of a first-order lag to the mean of both ends of the step.
+        self._sheath_c += self._follow * (0.5 * (self._met_c + met_c) - self._sheath_c)
+        self._met_c = met_c
+
+    def _arriving(self, left_s: float) -> float:
+        """Return the temperature of the water that left the heater at `left_s`."""
+        past = self._past
+        while past[1][0] <= left_s and len(past) > 2:
+            past.popleft()
+        (t0_s, first_c), (t1_s, second_c) = past[0], past[1]
+        if left_s >= t1_s:
+            return second_c
+        if left_s <= t0_s or t0_s == -math.inf:
+            return first_c
+        return first_c + (second_c - first_c) * (left_s - t0_s) / (t1_s - t0_s)
+
+    def spike(self, spike_k: float) -> None:
+        """Add `spike_k` to the next voltage that is read, once."""
+        self._spike_k = spike_k
+
+    def rewire(self, wiring: Wiring, duration_s: float) -> None:
+        """Connect the sensor as `wiring` says for `duration_s`."""
+        self._wiring = wiring
+        self._wiring_until_s = self._t_s + duration_s
+
+    def volts(self) -> float:
+        """Return the voltage on the wire: infinite when open, 0 when short, NaN when missing.
+
+        A pending spike is used up.
+        """
+        spike_k, self._spike_k = self._spike_k, 0.0
+        match self.wiring:
+            case Wiring.MISSING:
+                return math.nan
+            case Wiring.OPEN:
+                return math.inf
+            case Wiring.SHORT:
+                return 0.0
+            case Wiring.SOUND:
+                sound_v = LM335.volts(self._sheath_c + spike_k)
+                return sound_v * (1.0 + self._parameters.gain_error)
