@@ -1,0 +1,148 @@
+"""The two rows at the top: who, in which state, how old; and the values now."""
+
+from __future__ import annotations
+
+import math
+
+from rich.text import Text
+
+from thermoctl.app.live import numbers
+from thermoctl.app.live.look import Look, Role
+from thermoctl.app.live.model import View
+from thermoctl.app.live.rows import Part, fitted, parted
+from thermoctl.signals import Alarm, Mode, Quality, State
+
+_QUALITY_WORDS = {
+    Quality.GOOD: "reading is no number",
+    Quality.MISSING: "no sample",
+    Quality.OPEN: "sensor open",
+    Quality.SHORT: "sensor short",
+    Quality.STALE: "old sample",
+}
+
+
+def _speed(view: View) -> str:
+    speed = view.facts.speed
+    return "SIM max" if speed is None else f"SIM ×{speed:g}"
+
+
+def _age(view: View) -> str:
+    return "no data yet" if math.isnan(view.age_s) else f"data {numbers.age(view.age_s)} old"
+
+
+def _clock(view: View) -> str:
+    return numbers.wall_time(view.facts.zero, view.now_s)
+
+
+def _told(view: View, look: Look, width: int) -> Text | None:
+    """Return the first row as a banner, when the state asks for one."""
+    state = view.step.state if view.step else State.RUN
+    heated = view.accepted_power > 0.0
+    words = []
+    if state is State.LATCHED:
+        words.append("■ LATCHED")
+    elif state is State.SAFE:
+        words.append("■ SAFE")
+    if view.stale:
+        since = numbers.wall_time(view.facts.zero, view.last_good_s)
+        words.append("STALE" if since == numbers.UNKNOWN else f"STALE since {since}")
+    if not words:
+        return None
+    bar = Role.RED_BAR if state in (State.LATCHED, State.SAFE) else Role.STALE_BAR
+    words.append(f"heater {numbers.power(view.accepted_power)}" if heated else "heater off")
+    left = f"{view.facts.loop}   {' · '.join(words)}"
+    right = f"{_age(view)}   {_clock(view)}"
+    return parted(look, [(left, bar)], [(right, bar)], width, ground=bar)
+
+
+def state_row(view: View, look: Look, width: int) -> Text:
+    """Return the first row; inverted when stale, red when latched or safe."""
+    told = _told(view, look, width)
+    if told is not None:
+        return told
+    left: list[Part] = [("thermoctl ", Role.MUTE), (view.facts.loop, Role.STRONG)]
+    if view.facts.simulated:
+        left += [("   ", Role.PAGE), (f" {_speed(view)} ", Role.CHIP)]
+    if view.step is None:
+        left += [("   waiting for the first sample", Role.TEXT)]
+    else:
+        words = f" {view.step.mode.value} · {view.step.controller}"
+        left += [
+            ("   ", Role.PAGE),
+            (view.step.state.value.upper(), Role.STRONG),
+            (words, Role.TEXT),
+        ]
+    right = [(_age(view), Role.MUTE), ("   ", Role.PAGE), (_clock(view), Role.STRONG)]
+    return parted(look, left, right, width)
+
+
+def _worst(alarms: tuple[Alarm, ...], *, latched: bool) -> Alarm | None:
+    asked = [alarm for alarm in alarms if (alarm.latched if latched else alarm.active)]
+    return min(asked, key=lambda alarm: (alarm.priority, alarm.since_s), default=None)
+
+
+def why(view: View) -> str:
+    """Return why the heater is off, and what is waited for; empty when it need not be said."""
+    step = view.step
+    if step is None or step.state not in (State.LATCHED, State.SAFE):
+        return ""
+    latched = step.state is State.LATCHED
+    alarm = _worst(step.alarms, latched=latched)
+    cause = f"{alarm.code}: {alarm.text}" if alarm else step.command.reason
+    waits = "a acknowledges" if latched else "returns by itself after good data"
+    return f"{cause} · {waits}"
+
+
+def _alarms(view: View) -> list[Part]:
+    """Return what the right end of the second row says of alarms."""
+    alarms = view.step.alarms if view.step else ()
+    active = [alarm for alarm in alarms if alarm.active]
+    if active:
+        urgent = min(alarm.priority for alarm in active) <= 1
+        sign = ("■ ", Role.RED) if urgent else ("▲ ", Role.AMBER)
+        return [sign, (f"{len(active)} active", Role.TEXT)]
+    waiting = sum(not alarm.acknowledged for alarm in alarms)
+    return [("△ ", Role.AMBER), (f"{waiting} to acknowledge", Role.TEXT)] if waiting else []
+
+
+def values_row(view: View, look: Look, width: int) -> Text:
+    """Return the second row: the values now, or why the heater is off."""
+    reason = why(view)
+    if reason:
+        return fitted(look.text(("■ ", Role.RED), (reason, Role.RED)), width)
+    step = view.step
+    if step is None:
+        return fitted(look.text((numbers.UNKNOWN, Role.MUTE)), width)
+    value_c = view.temperature_c
+    if math.isnan(value_c):
+        words = _QUALITY_WORDS[step.measurement.quality]
+        left: list[Part] = [(numbers.UNKNOWN, Role.STRONG), (f" {words}", Role.TEXT)]
+    else:
+        # A value that is old is quiet: it is not what the water has now.
+        role = Role.MUTE if view.stale else Role.STRONG
+        change = f"  {numbers.difference(view.deviation_k):>8}"
+        left = [(numbers.temperature(value_c), role), (change, Role.TEXT)]
+    left += [("    set ", Role.MUTE), (numbers.temperature(step.setpoint_c), Role.STRONG)]
+    left += [("    power ", Role.MUTE)]
+    if math.isnan(view.accepted_power):
+        left += [(numbers.UNKNOWN, Role.STRONG), (" nothing accepted", Role.TEXT)]
+    else:
+        left += [(numbers.power(view.accepted_power), Role.STRONG)]
+    holding = view.beliefs.holding_power
+    if step.mode is not Mode.OFF and holding is not None and math.isfinite(holding):
+        percent = numbers.with_unit(numbers.number(100.0 * holding, 0), "%")
+        left += [(" · holds with ", Role.MUTE), (percent, Role.BLUE)]
+    return parted(look, left, _alarms(view), width)
+
+
+def one_line(view: View, look: Look, width: int) -> Text:
+    """Return all that a terminal too small for the charts gets."""
+    step = view.step
+    if step is None:
+        return fitted(look.text(("waiting for the first sample", Role.TEXT)), width)
+    words = [_clock(view), step.state.value.upper()]
+    words += ["STALE"] if view.stale else []
+    words += [why(view)] if why(view) else []
+    words += [numbers.temperature(view.temperature_c), numbers.difference(view.deviation_k)]
+    words += [f"set {numbers.temperature(step.setpoint_c)}", numbers.power(view.accepted_power)]
+    return fitted(look.text(("  ".join(words), Role.TEXT)), width)

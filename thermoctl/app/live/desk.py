@@ -1,0 +1,75 @@
+"""From actions to requests: what a key asks of the loop, and what is asked back before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from thermoctl.app.live.keys import Action
+from thermoctl.app.live.model import Facts
+from thermoctl.quantities import clamp
+from thermoctl.signals import Acknowledge, Mode, Request, SetPoint
+
+DISTURBANCES = frozenset({Action.COLD_WATER, Action.ICE, Action.STIRRER})
+"""Actions that disturb a simulated plant and are no request to the loop."""
+
+_SETPOINT_STEPS_K: Mapping[Action, float] = {
+    Action.SETPOINT_UP: 0.1,
+    Action.SETPOINT_DOWN: -0.1,
+    Action.SETPOINT_UP_MUCH: 1.0,
+    Action.SETPOINT_DOWN_MUCH: -1.0,
+}
+
+_NEXT_MODE: Mapping[Mode, Mode] = {
+    Mode.OFF: Mode.AUTO,
+    Mode.AUTO: Mode.MANUAL,
+    Mode.MANUAL: Mode.OFF,
+    Mode.PROGRAM: Mode.OFF,
+}
+
+
+class Desk:
+    """Turns actions into requests for one loop; does no I/O.
+
+    Off acts at once, because it is the safe direction. Every other mode is proposed first, and
+    confirmed with Enter; `prompt` is the question meanwhile.
+    """
+
+    def __init__(self, facts: Facts) -> None:
+        self._facts = facts
+        self._proposed: Mode | None = None
+
+    @property
+    def prompt(self) -> str:
+        """Return the question that is open; empty when there is none."""
+        if self._proposed is None:
+            return ""
+        return f"Enter: mode {self._proposed.value}   m: another   Esc: leave it"
+
+    def press(self, action: Action, mode: Mode, setpoint_c: float) -> Request | None:
+        """Return what `action` asks of a loop in `mode` with `setpoint_c`; None when nothing yet.
+
+        Set points stay within the limits, on whole tenths.
+        """
+        if action is Action.MODE:
+            return self._next(mode)
+        proposed, self._proposed = self._proposed, None
+        if action is Action.CONFIRM:
+            return proposed
+        if action is Action.ACKNOWLEDGE:
+            return Acknowledge()
+        step_k = _SETPOINT_STEPS_K.get(action)
+        if step_k is None:
+            return None
+        asked_c = round(setpoint_c + step_k, 1)
+        return SetPoint(clamp(asked_c, self._facts.setpoint_low_c, self._facts.setpoint_high_c))
+
+    def _next(self, mode: Mode) -> Mode | None:
+        """Return Off, to act at once, or propose the mode that comes next."""
+        following = _NEXT_MODE[self._proposed or mode]
+        if following is mode:
+            following = _NEXT_MODE[following]
+        if following is Mode.OFF:
+            self._proposed = None
+            return Mode.OFF
+        self._proposed = following
+        return None

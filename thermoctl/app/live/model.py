@@ -1,0 +1,283 @@
+"""What is shown, derived from the cycles of one loop; nothing here knows a terminal."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+
+from thermoctl.app.live.scale import Scale, range_for
+from thermoctl.app.live.sentences import Sentence, sentence
+from thermoctl.app.live.trend import Trend, TrendRecorder
+from thermoctl.quantities import Array
+from thermoctl.signals import Beliefs, Cycle, Event, Quality, Step
+
+RECENT = 300
+"""Samples that whiteness and tick time are judged on."""
+
+FEWEST = 30
+"""Pairs of samples before whiteness is judged at all."""
+
+DEVIATION_SAMPLES = 600
+"""Samples the standard deviation is taken from: ten minutes at one a second."""
+
+STALE_PERIODS = 3.0
+_EVENTS_KEPT = 200
+_NAN = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What does not change while the view is open.
+
+    Parameters
+    ----------
+    loop : str
+        Name of the loop whose cycles are shown.
+    period_s : float
+        Time between two samples in s, greater than zero.
+    setpoint_low_c, setpoint_high_c : float
+        Limits of the set point.
+    zero : datetime
+        Wall time at loop time 0.
+    simulated : bool
+        Whether the plant is a simulation.
+    speed : float or None
+        Simulated seconds per second; None is as fast as it goes.
+    """
+
+    loop: str
+    period_s: float
+    setpoint_low_c: float
+    setpoint_high_c: float
+    zero: datetime
+    simulated: bool = True
+    speed: float | None = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.period_s > 0.0:
+            raise ValueError(f"period_s must be positive, got {self.period_s!r}")
+        if not self.setpoint_low_c <= self.setpoint_high_c:
+            raise ValueError(
+                f"setpoint_low_c {self.setpoint_low_c!r} must not lie above "
+                f"setpoint_high_c {self.setpoint_high_c!r}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Whiteness:
+    """Lag-one autocorrelation of the innovations, and the limit a white sequence keeps to."""
+
+    autocorrelation: float
+    limit: float
+
+    @property
+    def verdict(self) -> str:
+        """Return the judgement: within the limit, within twice the limit, or beyond."""
+        if abs(self.autocorrelation) <= self.limit:
+            return "white"
+        return "nearly white" if abs(self.autocorrelation) <= 2.0 * self.limit else "not white"
+
+
+def whiteness(innovations: Sequence[float] | Array) -> Whiteness | None:
+    """Return how white `innovations` are; None before `FEWEST` neighbouring pairs.
+
+    The mean is not taken off: innovations of a right model have mean zero, and one that keeps its
+    sign is as much a fault of the model as one that alternates. The limit is two standard
+    deviations of the autocorrelation of white noise, ``2 / sqrt(N)``.
+
+    Parameters
+    ----------
+    innovations : sequence of float
+        Oldest first, in units of their own σ; NaN breaks a pair.
+    """
+    e = np.asarray(innovations, dtype=np.float64)
+    paired = np.isfinite(e[:-1]) & np.isfinite(e[1:])
+    count = int(paired.sum())
+    power = float(np.mean(np.square(e[np.isfinite(e)]))) if count else 0.0
+    if count < FEWEST or not 0.0 < power < math.inf:
+        return None
+    r1 = float(np.mean(e[:-1][paired] * e[1:][paired])) / power
+    return Whiteness(r1, 2.0 / math.sqrt(count))
+
+
+@dataclass(frozen=True, slots=True)
+class Recent:
+    """Figures of the last samples; NaN where too few are known.
+
+    Parameters
+    ----------
+    innovation : float
+        The last one, in its own σ.
+    whiteness : Whiteness or None
+        None when it cannot be judged yet.
+    deviation_sd_k, deviation_max_k : float
+        From the set point, over `deviation_s`.
+    tick_us, tick_99_us : float
+        CPU time of the last cycle, and what 99 % of the recent ones stayed below.
+    """
+
+    innovation: float
+    whiteness: Whiteness | None
+    deviation_sd_k: float
+    deviation_max_k: float
+    deviation_s: float
+    tick_us: float
+    tick_99_us: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """One moment of a run: all that `thermoctl.app.live.render.render` needs."""
+
+    facts: Facts
+    now_s: float
+    step: Step | None
+    accepted_power: float
+    last_good_s: float
+    trend: Trend
+    range_s: float
+    scale: Scale
+    recent: Recent
+    events: tuple[Sentence, ...]
+    prompt: str = ""
+
+    @property
+    def age_s(self) -> float:
+        """Return how long ago the last good sample was; NaN when there was none."""
+        return max(0.0, self.now_s - self.last_good_s) if self.now_s == self.now_s else _NAN
+
+    @property
+    def stale(self) -> bool:
+        """Return whether nothing good has come for more than three periods."""
+        return self.step is not None and not self.age_s <= STALE_PERIODS * self.facts.period_s
+
+    @property
+    def temperature_c(self) -> float:
+        """Return the temperature of the last step; NaN unless it was a good sample."""
+        if self.step is None or self.step.measurement.quality is not Quality.GOOD:
+            return _NAN
+        return self.step.measurement.temperature_c
+
+    @property
+    def deviation_k(self) -> float:
+        """Return temperature minus set point; NaN when either is not known."""
+        return _NAN if self.step is None else self.temperature_c - self.step.setpoint_c
+
+    @property
+    def beliefs(self) -> Beliefs:
+        """Return the last beliefs."""
+        return Beliefs() if self.step is None else self.step.beliefs
+
+
+def _known(value: float | None) -> float:
+    return _NAN if value is None else value
+
+
+def _in_sigma(step: Step) -> float:
+    """Return the innovation of `step` in its own σ; NaN when there was none."""
+    estimate = step.estimate
+    if estimate.rejected or not estimate.innovation_var > 0.0:
+        return _NAN
+    return estimate.innovation / math.sqrt(estimate.innovation_var)
+
+
+class LiveModel:
+    """Takes the cycles of one loop and gives a `View` at any moment; memory is bounded.
+
+    Parameters
+    ----------
+    facts : Facts
+        What does not change. Cycles of other loops are passed over.
+    """
+
+    def __init__(self, facts: Facts) -> None:
+        self.facts = facts
+        self._cycle: Cycle | None = None
+        self._last_good_s = _NAN
+        self._first_s = _NAN
+        self._recorder = TrendRecorder(facts.period_s)
+        self._scale = Scale()
+        self._range_s = 0.0
+        self._innovations: deque[float] = deque(maxlen=RECENT)
+        self._ticks_us: deque[float] = deque(maxlen=RECENT)
+        self._deviations_k: deque[float] = deque(maxlen=DEVIATION_SAMPLES)
+        self._events: deque[Sentence] = deque(maxlen=_EVENTS_KEPT)
+
+    def feed(self, cycle: Cycle) -> None:
+        """Take one finished cycle."""
+        step = cycle.step
+        if cycle.loop != self.facts.loop:
+            return
+        self._cycle = cycle
+        measurement, beliefs = step.measurement, step.beliefs
+        temperature_c = _NAN
+        if measurement.quality is Quality.GOOD and math.isfinite(measurement.temperature_c):
+            temperature_c = measurement.temperature_c
+            self._last_good_s = step.t_s
+        if self._first_s != self._first_s:
+            self._first_s = step.t_s
+        deviation_k = temperature_c - step.setpoint_c
+        innovation = _in_sigma(step)
+        self._innovations.append(innovation)
+        self._deviations_k.append(deviation_k)
+        self._ticks_us.append(cycle.tick_us)
+        self._scale.grow(temperature_c)
+        self._scale.grow(step.setpoint_c)
+        self._recorder.add(
+            step.t_s,
+            (temperature_c, 1e3 * deviation_k, innovation),
+            (
+                cycle.accepted_power,
+                step.estimate.inflation,
+                step.setpoint_c,
+                _known(beliefs.gain),
+                _known(beliefs.a),
+                _known(beliefs.holding_power),
+            ),
+        )
+        for event in step.events:
+            self.note(event)
+
+    def note(self, event: Event) -> None:
+        """Take an event that came by another way than a step."""
+        self._events.append(sentence(event))
+
+    def view(self, now_s: float, prompt: str = "") -> View:
+        """Return what is to be shown at loop time `now_s`, with `prompt` in the row of keys."""
+        cycle = self._cycle
+        self._range_s = max(self._range_s, range_for(now_s - self._first_s))
+        return View(
+            facts=self.facts,
+            now_s=now_s,
+            step=None if cycle is None else cycle.step,
+            accepted_power=_NAN if cycle is None else cycle.accepted_power,
+            last_good_s=self._last_good_s,
+            trend=self._recorder.trend(),
+            range_s=self._range_s,
+            scale=self._scale.copy(),
+            recent=self._recent(),
+            events=tuple(self._events),
+            prompt=prompt,
+        )
+
+    def _recent(self) -> Recent:
+        """Return the figures of the last samples."""
+        deviations = np.array(self._deviations_k)
+        deviations = deviations[np.isfinite(deviations)]
+        ticks = np.array(self._ticks_us)
+        ticks = ticks[np.isfinite(ticks)]
+        enough = deviations.size >= FEWEST
+        return Recent(
+            innovation=self._innovations[-1] if self._innovations else _NAN,
+            whiteness=whiteness(self._innovations),
+            deviation_sd_k=float(deviations.std()) if enough else _NAN,
+            deviation_max_k=float(np.abs(deviations).max()) if enough else _NAN,
+            deviation_s=len(self._deviations_k) * self.facts.period_s,
+            tick_us=self._ticks_us[-1] if self._ticks_us else _NAN,
+            tick_99_us=float(np.quantile(ticks, 0.99)) if ticks.size >= FEWEST else _NAN,
+        )

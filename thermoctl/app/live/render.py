@@ -1,0 +1,107 @@
+"""The whole picture: a pure function of a view, of the size, and of the look.
+
+From top to bottom: state, values, temperature, deviation, power, time axis, beliefs, events and
+keys. Nothing scrolls; on a higher terminal the charts and the list of events grow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rich.text import Text
+
+from thermoctl.app.live import banner, charts, numbers, panel
+from thermoctl.app.live.look import Look, Role
+from thermoctl.app.live.model import View
+from thermoctl.app.live.rows import Part, fitted, parted, ruled
+from thermoctl.app.live.sentences import Mark, Sentence
+
+LEAST_WIDTH, LEAST_HEIGHT = 80, 24
+
+_MARK_ROLES = {Mark.WARNING: Role.AMBER, Mark.ALARM: Role.RED, Mark.CHANGE: Role.BLUE}
+_TIGHT_BELOW = 100
+
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """How many rows the parts that can grow get; everything else takes eleven."""
+
+    temperature: int = 4
+    deviation: int = 4
+    power: int = 2
+    events: int = 2
+
+
+def _layout(height: int) -> _Layout:
+    """Return the layout for `height` rows, at least 24; further rows are dealt out in turn."""
+    turn = "EETDEE" + "TDTDE" * height
+    extra = turn[: height - LEAST_HEIGHT]
+    return _Layout(4 + extra.count("T"), 4 + extra.count("D"), 2, 2 + extra.count("E"))
+
+
+def _event_row(view: View, look: Look, event: Sentence, width: int) -> Text:
+    role = _MARK_ROLES.get(event.mark, Role.TEXT)
+    left: list[Part] = [
+        (f"{numbers.wall_time(view.facts.zero, event.t_s):<8}  ", Role.MUTE),
+        (f"{event.mark.value} ", role),
+        (event.text, Role.BLUE if event.mark is Mark.CHANGE else Role.TEXT),
+    ]
+    return parted(look, left, [(event.name, Role.MUTE)], width)
+
+
+def _events(view: View, look: Look, rows: int, width: int) -> list[Text]:
+    """Return the last events, the newest first."""
+    newest = view.events[::-1][:rows]
+    shown = [_event_row(view, look, event, width) for event in newest]
+    if not shown:
+        shown = [fitted(look.text(("nothing has happened yet", Role.MUTE)), width)]
+    return shown + [fitted(look.text(), width) for _ in range(rows - len(shown))]
+
+
+def _keys(view: View, look: Look, width: int) -> Text:
+    """Return the row of keys, or the question that is open."""
+    if view.prompt:
+        return fitted(look.text((f" {view.prompt} ", Role.CHIP)), width)
+    tight = width < _TIGHT_BELOW
+    keys = [("↑↓", "set" if tight else "set point"), ("m", "mode")]
+    if view.facts.simulated:
+        keys += [("d", "cold" if tight else "cold water"), ("i", "ice")]
+        keys += [("s", "stir" if tight else "stirrer")]
+    keys += [("a", "ack"), ("q", "quit")]
+    parts: list[Part] = []
+    for key, words in keys:
+        parts += [(f" {key} ", Role.CHIP), (f" {words}  ", Role.MUTE)]
+    return fitted(look.text(*parts), width)
+
+
+def render(view: View, width: int, height: int, look: Look) -> list[Text]:
+    """Return `view` as `height` rows of `width` cells each.
+
+    Parameters
+    ----------
+    view : View
+        One moment of a run.
+    width, height : int
+        Size of the terminal. Below 80 by 24 the first row says all there is room for.
+    look : Look
+        What the terminal can show.
+    """
+    if width < LEAST_WIDTH or height < LEAST_HEIGHT:
+        rows = [banner.one_line(view, look, width)] if height > 0 else []
+        return rows + [fitted(look.text(), width) for _ in range(height - len(rows))]
+    layout, chart = _layout(height), charts.frame(view, look, width)
+    return [
+        banner.state_row(view, look, width),
+        banner.values_row(view, look, width),
+        ruled(look, "Temperature °C", f"last {numbers.span(view.range_s)}", width),
+        *charts.temperature(chart, layout.temperature),
+        ruled(look, "Deviation mK", f"dotted: ±{charts.DEVIATION_BAND_MK:g} mK", width),
+        *charts.deviation(chart, layout.deviation),
+        *charts.power(chart, layout.power),
+        charts.time_axis(chart),
+        ruled(look, "What it believes", panel.note(view), width),
+        *panel.beliefs(view, look, width),
+        ruled(look, "Events", "", width),
+        *_events(view, look, layout.events, width),
+        _keys(view, look, width),
+    ]
