@@ -182,7 +182,8 @@ def board_builder(settings: BaseModel, clock: Clock) -> Callable[[], Board]:
     driver = plugins.find(plugins.DRIVERS, settings.kind)  # type: ignore[attr-defined]
 
     def build() -> Board:
-        link = _serial_link(settings) if driver.transport == "serial" else None
+        wired = getattr(driver, "transport", "none") == "serial"
+        link = _serial_link(settings) if wired else None
         board: Board = driver(settings, link, clock)
         return board
 

@@ -214,7 +214,8 @@ class Regulator:
             foreseen = None if seen else identifier.foresee(last, applied)
             return identifier.update(before, temperature_c, applied), foreseen
 
-        after, self._foreseen = self._guarded(learn, (before, None), "estimator.failed", t_s)
+        kept: tuple[IdentifierBelief, IdentifierBelief | None] = (before, None)
+        after, self._foreseen = self._guarded(learn, kept, "estimator.failed", t_s)
         if math.isfinite(float(after.estimate.theta.sum() + after.estimate.P.sum())):
             self._identified = after
         else:
