@@ -30,6 +30,7 @@ DASHES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2
 
 TRUE_DASH = (0, (4, 2.5))
 POINTS_PER_PANEL = 1_500
+FORMATS = (".png", ".svg")
 
 _STYLE: Any = {
     "font.family": "DejaVu Sans",
@@ -64,6 +65,16 @@ _STYLE: Any = {
 }
 
 
+def require_matplotlib() -> None:
+    """Raise `Unavailable`, saying what to install, where nothing can be drawn."""
+    try:
+        import matplotlib.figure  # noqa: F401
+    except ImportError as missing:
+        raise Unavailable(
+            "figures need matplotlib, which is not installed: pip install thermoctl[plot]"
+        ) from missing
+
+
 @contextmanager
 def styled(
     width_in: float, height_in: float, rows: int, columns: int, **grid: Any
@@ -84,13 +95,10 @@ def styled(
     Unavailable
         If matplotlib is not installed.
     """
-    try:
-        from matplotlib import rc_context
-        from matplotlib.figure import Figure
-    except ImportError as missing:
-        raise Unavailable(
-            "figures need matplotlib, which is not installed: pip install thermoctl[plot]"
-        ) from missing
+    require_matplotlib()
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
     with rc_context(_STYLE):
         figure = Figure(figsize=(width_in, height_in))
         yield figure, figure.subplots(rows, columns, squeeze=False, **grid)
@@ -107,7 +115,7 @@ def save(figure: Any, path: Path) -> Path:
         If it cannot be written.
     """
     kind = path.suffix.lower()
-    if kind not in (".png", ".svg"):
+    if kind not in FORMATS:
         raise ValueError(f"expected a figure file ending in .png or .svg, got {path.name!r}")
     # Without a date in it, the same run gives the same file.
     metadata = {"Date": None} if kind == ".svg" else {"Software": None}

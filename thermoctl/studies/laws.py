@@ -18,6 +18,7 @@ from thermoctl.estimation import (
     VariableForgetting,
     start,
 )
+from thermoctl.model.arx import Arx
 from thermoctl.ports import Estimator
 from thermoctl.signals import Estimate
 
@@ -81,6 +82,30 @@ _KINDS: Mapping[str, _Kind] = {
         normalised=True,
     ),
 }
+
+
+def parse_order(text: str) -> Arx:
+    """Return the structure `text` names, as in ``2,2,1``: past outputs, inputs, delay in samples.
+
+    Raises
+    ------
+    ValueError
+        If it is not three integers, or out of range.
+    """
+    words = text.split(",")
+    try:
+        n, m, delay = (int(word) for word in words)
+    except ValueError:
+        raise ValueError(f"expected n,m,d such as 2,2,1; got {text!r}") from None
+    return Arx(n, m, delay)
+
+
+def parameter_names(order: Arx) -> tuple[str, ...]:
+    """Return a1 ... an, b1 ... bm, in the order of theta."""
+    return (
+        *(f"a{k}" for k in range(1, order.n + 1)),
+        *(f"b{k}" for k in range(1, order.m + 1)),
+    )
 
 
 def parse_law(text: str) -> LawSpec:

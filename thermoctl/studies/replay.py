@@ -45,6 +45,8 @@ class Conditions:
     ----------
     order : Arx
         Structure of the model.
+    mean_removed : bool
+        Whether the record was centred and scaled.
     y_centre, y_scale, u_centre, u_scale : float
         Scaled output = (y - y_centre)/y_scale, and the input likewise.
     R2 : float
@@ -63,6 +65,7 @@ class Conditions:
     """
 
     order: Arx
+    mean_removed: bool
     y_centre: float
     y_scale: float
     u_centre: float
@@ -79,7 +82,9 @@ class Conditions:
 class Score:
     """How one law did; the names are the keys of ``replay --json``.
 
-    `rms_error` is in the unit of the output, `theta` and `theta_sd` are the last estimate and its
+    `rms_error` is in the unit of the output, `r2` its share of the output's variance taken from 1,
+    `whiteness_p` the p value of `thermoctl.studies.whiteness.ljung_box`, NaN where `r2` is not
+    positive, `theta` and `theta_sd` are the last estimate and its
     standard deviation in the units of the record, `us_per_sample` is the median time of an update.
     """
 
@@ -223,6 +228,7 @@ def _prepare(record: Record, order: Arx, P0: float, keep_mean: bool) -> tuple[_S
     counted = scaled.whole[learning:]
     return scaled, Conditions(
         order=order,
+        mean_removed=not keep_mean,
         y_centre=y_centre,
         y_scale=y_scale,
         u_centre=u_centre,
@@ -311,11 +317,14 @@ def _score(
     y = scaled.y[counted] * conditions.y_scale
     spread = float(np.var(y)) if len(y) else math.nan
     mean_square = float(np.mean(e**2)) if len(e) else math.nan
+    r2 = 1.0 - mean_square / spread if spread > 0.0 else math.nan
+    # One error that dwarfs all others looks white; whoever foresaw nothing gets no such praise.
+    p = ljung_box(e / trace.innovation_sd[counted]).p if r2 > 0.0 else math.nan
     return Score(
         name=name,
         rms_error=math.sqrt(mean_square),
-        r2=1.0 - mean_square / spread if spread > 0.0 else math.nan,
-        whiteness_p=ljung_box(e / trace.innovation_sd[counted]).p,
+        r2=r2,
+        whiteness_p=p,
         theta=tuple(trace.theta[-1].tolist()),
         theta_sd=tuple(trace.theta_sd[-1].tolist()),
         us_per_sample=1e6 * update_s,

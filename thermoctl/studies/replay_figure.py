@@ -9,6 +9,7 @@ import numpy as np
 
 from thermoctl.quantities import Array
 from thermoctl.studies import figure as house
+from thermoctl.studies.laws import parameter_names
 from thermoctl.studies.record import GAP
 from thermoctl.studies.replay import Replay
 from thermoctl.studies.words import number, probability
@@ -32,7 +33,7 @@ def draw_replay(result: Replay, paths: list[Path]) -> list[Path]:
     OSError
         If a file cannot be written.
     """
-    names = parameter_names(result)
+    names = parameter_names(result.conditions.order)
     heights = [*_RECORD_IN, *[_PARAMETER_IN] * len(names), *[_INNOVATION_IN] * len(result.scores)]
     height = sum(heights) + _SPACE_IN * (len(heights) - 1) + _TOP_IN + _BOTTOM_IN
     grid = {"sharex": True, "height_ratios": heights}
@@ -58,12 +59,6 @@ def draw_replay(result: Replay, paths: list[Path]) -> list[Path]:
         panels[-1].set_xlabel(f"time, {unit}" if result.record.names.time else "row")
         figure.align_ylabels(panels)
         return [house.save(figure, path) for path in paths]
-
-
-def parameter_names(result: Replay) -> list[str]:
-    """Return a1 ... an, b1 ... bm, in the order of theta."""
-    order = result.conditions.order
-    return [f"a{k}" for k in range(1, order.n + 1)] + [f"b{k}" for k in range(1, order.m + 1)]
 
 
 def _letter(index: int) -> str:

@@ -1,0 +1,185 @@
+"""Results of studies as tables for people and as JSON for programs."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from thermoctl.studies.experiment import Measures
+from thermoctl.studies.laws import parameter_names
+from thermoctl.studies.record import Record
+from thermoctl.studies.replay import Replay
+from thermoctl.studies.words import duration, number, probability
+
+
+def replay_json(result: Replay) -> dict[str, Any]:
+    """Return the result as JSON has it: no NaN, but null for what is not known."""
+    order = result.conditions.order
+    conditions = {
+        **_fields(result.conditions),
+        "order": [order.n, order.m, order.delay],
+        "skipped_rows": result.record.skipped,
+        "notes": list(result.record.notes),
+    }
+    return {
+        "samples": len(result.record.t_s),
+        "estimators": [_fields(score) for score in result.scores],
+        "conditions": conditions,
+    }
+
+
+def experiment_json(
+    measures: Measures, conditions: Mapping[str, Any], figures: Sequence[Path]
+) -> dict[str, Any]:
+    """Return the measures of an experiment, under which conditions, and where its figures are."""
+    return {
+        "measures": _fields(measures),
+        "conditions": dict(conditions),
+        "figures": {path.suffix[1:]: str(path) for path in figures},
+    }
+
+
+def _fields(of: Any) -> dict[str, Any]:
+    """Return the fields of a flat dataclass, with null for floats that are not finite."""
+    return {field.name: _finite(getattr(of, field.name)) for field in dataclasses.fields(of)}
+
+
+def _finite(value: Any) -> Any:
+    """Return `value`, or null where JSON has no word for it."""
+    if isinstance(value, tuple):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def print_replay(console: Console, result: Replay) -> None:
+    """Print what was read, what was done to it, and how every law did."""
+    for line in (*_about_record(result.record), *_about_conditions(result)):
+        console.print(line, style="none", markup=False, soft_wrap=True)
+    for table in (_prediction_table(result), _parameter_table(result)):
+        console.print()
+        console.print(table)
+    console.print()
+    for line in _warnings(result):
+        console.print(line, markup=False, soft_wrap=True)
+
+
+def _about_record(record: Record) -> list[str]:
+    """Return lines about the file."""
+    names, samples = record.names, f"{len(record.t_s):,} samples"
+    timing = "evenly spaced rows"
+    if names.time is not None:
+        timing = f"every {record.period_s:g} s, {duration(float(record.t_s[-1]))}"
+    head = f"Record   {record.source}: {samples}, {timing}; {names.input} → {names.output}"
+    return [head, *(f"         {note}" for note in record.notes)]
+
+
+def _about_conditions(result: Replay) -> list[str]:
+    """Return lines about structure, scaling, noise and scoring."""
+    c = result.conditions
+    kept = "taken as recorded: mean kept, not scaled"
+    if c.mean_removed:
+        kept = (
+            f"mean removed, scaled by the standard deviation: output {c.y_centre:.4g} ±"
+            f" {c.y_scale:.4g}, input {c.u_centre:.4g} ± {c.u_scale:.4g}"
+        )
+    return [
+        f"Model    {c.order.n} past outputs, {c.order.m} inputs, delay {c.order.delay}; {kept}",
+        f"Noise    R2 = {c.R2:.4g} (sd {math.sqrt(c.R2):.4g}), {c.R2_source}",
+        f"Score    {c.scored:,} predictions from sample {c.scored_from + 1:,} on;"
+        f" the last value as prediction: rms {c.persistence_rms:.4g}",
+    ]
+
+
+def _table(*headings: str) -> Table:
+    """Return an empty table: the first column words, the others figures."""
+    table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0), header_style="bold")
+    for place, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if place else "left", no_wrap=True)
+    return table
+
+
+def _prediction_table(result: Replay) -> Table:
+    """Return how well each law foresaw the output."""
+    table = _table("\nestimator", "\nrms error", "\nR²", "whiteness\np", "µs a\nsample")
+    for score in result.scores:
+        table.add_row(
+            score.name,
+            _figure(score.rms_error, ".4f"),
+            _figure(score.r2, ".5f"),
+            probability(score.whiteness_p),
+            _figure(score.us_per_sample, ".1f"),
+        )
+    return table
+
+
+def _figure(value: float, form: str) -> str:
+    """Return a figure, in powers of ten where its decimals would say nothing."""
+    if not math.isfinite(value):
+        return "–"
+    large = abs(value) >= 1e5 or 0.0 < abs(value) < 1e-3
+    return f"{value:{'.2e' if large else form}}".replace("-", "−")
+
+
+def _parameter_table(result: Replay) -> Table:
+    """Return the last parameters of each law."""
+    table = _table("parameters ± 2σ", *parameter_names(result.conditions.order))
+    for score in result.scores:
+        pairs = zip(score.theta, score.theta_sd, strict=True)
+        table.add_row(score.name, *(number(value, sd) for value, sd in pairs))
+    return table
+
+
+def _warnings(result: Replay) -> list[str]:
+    """Return what a reader of the tables must not overlook."""
+    base = result.conditions.persistence_rms
+    lines = [
+        f"{score.name} foresaw nothing: its error is larger than the spread of the record."
+        for score in result.scores
+        if not score.r2 > 0.0
+    ]
+    worse = [s.name for s in result.scores if s.r2 > 0.0 and s.rms_error > base]
+    if worse:
+        lines.append(f"Worse than the last value as prediction: {', '.join(worse)}.")
+    if not any(score.whiteness_p >= 0.05 for score in result.scores):
+        lines.append(
+            "No innovations are white (p < 0.05): the model or its order leaves something out."
+        )
+    return lines
+
+
+def print_experiment(console: Console, title: str, measures: Measures) -> None:
+    """Print the measures of an experiment, each with its unit."""
+    console.print(title, markup=False, soft_wrap=True)
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column(justify="right", no_wrap=True)
+    table.add_column(no_wrap=True)
+    for name, value, unit in _measure_rows(measures):
+        table.add_row(name, "–" if value is None else value.replace("-", "−"), unit)
+    console.print(table)
+
+
+def _measure_rows(measures: Measures) -> list[tuple[str, str | None, str]]:
+    """Return name, figure and unit of every measure."""
+
+    def put(value: float | None, form: str, factor: float = 1.0) -> str | None:
+        return None if value is None else format(factor * value, form)
+
+    return [
+        ("set point reached after", put(measures.warm_up_s, ".0f"), "s"),
+        ("overshoot", put(measures.overshoot_k, ".2f"), "K"),
+        ("regulation judged over", put(measures.window_s, ".0f"), "s"),
+        ("bias", put(measures.bias_k, "+.3f"), "K"),
+        ("standard deviation", put(measures.deviation_k, ".3f"), "K"),
+        ("range", put(measures.range_k, ".2f"), "K"),
+        ("limit cycle, peak to peak", put(measures.cycle_k, ".2f"), "K"),
+        ("limit cycle, period", put(measures.cycle_period_s, ".0f"), "s"),
+        ("actuator travel", put(measures.travel_per_min, ".2f"), "full ranges a minute"),
+        ("mean power", put(measures.mean_power, ".1f", 100.0), "%"),
+    ]
