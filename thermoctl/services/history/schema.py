@@ -6,12 +6,12 @@ and the header of the CSV all follow from it.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from thermoctl.services.plain import as_json
 from thermoctl.signals import Cycle, Event
 
 SCHEMA_VERSION: Final = 1
@@ -148,15 +148,6 @@ def row_of(cycle: Cycle) -> tuple[Value, ...]:
 def event_row_of(event: Event, loop: str | None) -> tuple[Value, ...]:
     """Return `event` as loop, t_s, name and its fields as JSON text."""
     return _text(loop), _real(event.t_s) or 0.0, _text(event.name), as_json(event.fields)
-
-
-def as_json(fields: Mapping[str, object]) -> str:
-    """Return `fields` as one line of JSON; what is no finite number becomes null or its text."""
-    tame = {
-        str(name): None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in fields.items()
-    }
-    return json.dumps(tame, default=str, sort_keys=True)
 
 
 def _real(value: Any) -> float | None:

@@ -7,7 +7,6 @@ and never a late cycle. The tests in ``tests/faults/test_storage_history.py`` sh
 
 from __future__ import annotations
 
-import itertools
 import sqlite3
 import threading
 import time
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import Final
 
 from thermoctl.ports import Health
+from thermoctl.services.feed import Feed
 from thermoctl.services.history.file import HistoryFile, Opened, Row, open_history
 from thermoctl.services.history.schema import (
     INSERT_CLOCK_STEP,
@@ -71,19 +71,17 @@ class HistoryWriter:
         feed_size: int = 4096,
         max_cycles: int = 10_000_000,
     ) -> None:
-        for name, value in (("feed_size", feed_size), ("max_cycles", max_cycles)):
-            if value < 1:
-                raise ValueError(f"{name} must be at least 1, got {value!r}")
+        if max_cycles < 1:
+            raise ValueError(f"max_cycles must be at least 1, got {max_cycles!r}")
         if not commit_every_s > 0.0:
             raise ValueError(f"commit_every_s must be positive, got {commit_every_s!r}")
         self._file = HistoryFile(Path(path), run, wall_clock, max_cycles)
         self._wall_clock = wall_clock
         self._report = report
         self._commit_every_s = commit_every_s
-        self._feed: deque[tuple[int, float, Cycle]] = deque(maxlen=feed_size)
-        self._numbers = itertools.count()
+        self._feed: Feed[tuple[float, Cycle]] = Feed(feed_size)
         self._waiting: deque[Row] = deque(maxlen=2 * feed_size)  # events come on top of cycles
-        self._taken = self._lost_in_feed = self._lost_waiting = self._written = self._set_aside = 0
+        self._lost_waiting = self._written = self._set_aside = 0
         self._reported_drops = 0
         self._last_t_s: float | None = None
         self._stored_t_s: float | None = None
@@ -98,7 +96,7 @@ class HistoryWriter:
 
     def publish(self, cycle: Cycle) -> None:
         """Hand `cycle` over: one append, whatever the disk is doing."""
-        self._feed.append((next(self._numbers), self._wall_clock(), cycle))
+        self._feed.put((self._wall_clock(), cycle))
 
     def close(self, timeout_s: float = 2.0) -> bool:
         """Write what waits and close the file; return whether all of it reached the disk in time.
@@ -149,7 +147,7 @@ class HistoryWriter:
 
     @property
     def _dropped(self) -> int:
-        return self._lost_in_feed + self._lost_waiting
+        return self._feed.dropped + self._lost_waiting
 
     def _run(self) -> None:
         while not self._closing.wait(self._commit_every_s):
@@ -159,11 +157,8 @@ class HistoryWriter:
             self._file.close()
 
     def _drain(self) -> None:
-        """Take what the loop published; its numbers say how many the full feed has dropped."""
-        for _ in range(len(self._feed)):  # not "while": a fast simulation publishes for ever
-            number, wall_utc_s, cycle = self._feed.popleft()
-            self._taken += 1
-            self._lost_in_feed = number + 1 - self._taken
+        """Turn what the loop published into rows."""
+        for wall_utc_s, cycle in self._feed.take():
             self._watch_wall_clock(wall_utc_s, cycle.step.t_s)
             try:
                 self._keep((INSERT_CYCLE, (wall_utc_s, *row_of(cycle))))

@@ -1,0 +1,74 @@
+"""Every event and alarm code there is, with the level of its line in the journal.
+
+The names are API. What each one means stands in ``docs/events.md``, and a test holds the two and
+the source together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+PRIORITIES: Final[Mapping[str, int]] = MappingProxyType(
+    {"critical": 2, "error": 3, "warning": 4, "info": 6}
+)
+"""Levels and their syslog priorities."""
+
+_BY_LEVEL: Final = {
+    "critical": (
+        "trip.over_temperature",
+        "trip.under_temperature",
+        "latch.unreadable",
+    ),
+    "error": (
+        "board.lost",
+        "board.wrong",
+        "controller.failed",
+        "cycle.failed",
+        "output.nan",
+        "output.readback",
+        "output.refused",
+        "sensor.open",
+        "sensor.short",
+    ),
+    "warning": (
+        "board.retry",
+        "clock.stepped",
+        "cycle.late",
+        "cycle.missed",
+        "estimator.rejected",
+        "estimator.reset",
+        "history.drops",
+        "history.failed",
+        "history.set_aside",
+        "journal.drops",
+        "latch.unsaved",
+        "sensor.missing",
+        "sensor.spike",
+        "sensor.stale",
+        "state.ignored",
+    ),
+    "info": (
+        "alarm.acknowledged",
+        "board.opened",
+        "config.loaded",
+        "history.recovered",
+        "latch.cleared",
+        "loop.started",
+        "loop.stopped",
+        "mode.changed",
+        "setpoint.changed",
+        "state.changed",
+    ),
+}
+
+EVENTS: Final[Mapping[str, str]] = MappingProxyType(
+    {name: level for level, names in _BY_LEVEL.items() for name in names}
+)
+"""Level of every event by its name."""
+
+
+def level_of(name: str) -> str:
+    """Return the level of the event `name`; one that a plug-in brought along is a warning."""
+    return EVENTS.get(name, "warning")

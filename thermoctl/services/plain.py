@@ -1,0 +1,34 @@
+"""Make values plain: text that any terminal, file, journal or database takes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+
+def plain_text(value: Any) -> str:
+    """Return `value` as one printable line; control characters and lone surrogates are escaped."""
+    text = str(value)
+    return text if text.isprintable() else repr(text)[1:-1]
+
+
+def as_json(fields: Mapping[str, Any]) -> str:
+    """Return `fields` as one line of JSON; what is no finite number becomes null or its text."""
+    return json.dumps(_tame(fields))
+
+
+def _tame(value: Any) -> Any:
+    """Reduce to what JSON has: no NaN, no infinity, none of numpy's types."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(name): _tame(inner) for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_tame(inner) for inner in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, int | None) else str(value)
