@@ -19,10 +19,10 @@
 
 #define FULL_POWER 10000U /* a power of 1 in the protocol's unit, 1/10000 */
 
-/* Timer 1 runs freely at F_CPU / 8; every interval below is in these half microseconds. */
+/* Timer 0: 1 kHz. Timer 1: one conversion and one step of the internal time base every 1/32 of a
+ * mains period. Timer 2: the gate of the phase angle. */
 #define TIMER1_HZ (F_CPU / 8UL)
-
-/* One conversion and one step of the internal time base every 1/32 of a mains period. */
+#define GATE_HZ (F_CPU / 64UL)
 #define TICKS_PER_CYCLE 32U
 #define TICKS_PER_HALF (TICKS_PER_CYCLE / 2U)
 

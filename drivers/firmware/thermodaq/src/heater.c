@@ -10,7 +10,14 @@
 /* A gate still on at the zero crossing would fire the triac for the whole next half wave, so it
  * goes off this long before; and none fires earlier than this after the crossing, where the
  * voltage is too small to hold the triac. */
-#define GATE_MARGIN (TIMER1_HZ / 2000UL) /* 0.5 ms */
+#define GATE_MARGIN (GATE_HZ / 2000UL) /* 0.5 ms */
+
+/* The smallest power a gate at its latest instant can stand for. */
+#define PHASE_LEAST (FULL_POWER / 100U)
+
+/* Longest stretch the 8-bit timer is set to at once, and the shortest that it cannot miss. */
+#define STRETCH_MAX 250U
+#define STRETCH_MIN 16U
 
 /* Without a crossing for this many half waves the input counts as open. */
 #define MISSING_HALVES 3U
@@ -19,7 +26,7 @@
 #define TRUSTED_CROSSINGS 8U
 
 static struct configuration setup;
-static uint16_t half_wave; /* timer 1 counts */
+static uint16_t half_wave; /* in counts of the gate timer, as are the delays */
 
 static volatile uint16_t power;
 static volatile uint16_t left_ms; /* of the command's validity; 0: none in force */
@@ -27,21 +34,51 @@ static volatile uint8_t cut = CUT_RESET;
 
 static uint16_t accumulator; /* Bresenham over cycles */
 static uint16_t fire_delay;  /* phase angle: from the crossing to the gate; 0: stay off */
-static bool gate_open;       /* phase angle: what the next compare match ends */
+static uint16_t gate_left;   /* until the gate changes, beyond the stretch that is running */
+static bool gate_open;
 static uint8_t ticks;        /* of the internal time base, within one cycle */
 static uint8_t quiet_ticks;  /* since the last crossing, saturating */
 static uint8_t crossings;    /* accepted in a row, saturating */
 static bool synchronous;     /* cycles begin at crossings, not at the internal time base */
 static bool second_half;
-static uint16_t last_crossing;
 
 static void pin_off(void) { PORTD &= (uint8_t)~_BV(HEATER_PIN); }
 static void pin_on(void) { PORTD |= _BV(HEATER_PIN); }
 
+static void gate_timer_stop(void)
+{
+    TCCR2B = 0;
+    TIMSK2 = 0;
+    TIFR2 = _BV(OCF2A);
+}
+
+/* Set the next stretch of `gate_left`; the timer clears itself at a match and runs on. */
+static void gate_timer_stretch(void)
+{
+    uint16_t stretch = gate_left;
+    if (stretch > STRETCH_MAX + STRETCH_MIN)
+        stretch = STRETCH_MAX;
+    else if (stretch > STRETCH_MAX)
+        stretch = STRETCH_MAX / 2;
+    OCR2A = (uint8_t)(stretch - 1);
+    gate_left -= stretch;
+}
+
+static void gate_timer_start(uint16_t counts)
+{
+    gate_timer_stop();
+    gate_left = counts;
+    TCNT2 = 0;
+    TCCR2A = _BV(WGM21);
+    gate_timer_stretch();
+    TIMSK2 = _BV(OCIE2A);
+    TCCR2B = _BV(CS22); /* F_CPU / 64 */
+}
+
 static void off(void)
 {
     pin_off();
-    TIMSK1 &= (uint8_t)~_BV(OCIE1B);
+    gate_timer_stop();
     power = 0;
     left_ms = 0;
     accumulator = 0;
@@ -65,7 +102,7 @@ static uint16_t delay_for(uint16_t wanted)
     if (delay < GATE_MARGIN)
         return GATE_MARGIN;
     if (delay > half_wave - 2 * GATE_MARGIN)
-        return 0; /* too small to fire at all */
+        return half_wave - 2 * GATE_MARGIN;
     return delay;
 }
 
@@ -75,7 +112,7 @@ void heater_configure(const struct configuration *chosen, enum cut_reason reason
     {
         off();
         setup = *chosen;
-        half_wave = (uint16_t)(TIMER1_HZ / 2 / chosen->mains_hz);
+        half_wave = (uint16_t)(GATE_HZ / 2 / chosen->mains_hz);
         cut = reason;
         crossings = 0;
         synchronous = false;
@@ -88,6 +125,8 @@ uint16_t heater_set(uint16_t wanted, uint16_t valid_ms)
         wanted = setup.power_max;
     if (valid_ms > setup.dead_man_ms)
         valid_ms = setup.dead_man_ms;
+    if (setup.mode == MODE_PHASE_ANGLE && wanted < PHASE_LEAST)
+        wanted = 0;
     uint16_t delay = delay_for(wanted);
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
     {
@@ -164,12 +203,9 @@ void heater_tick(void)
 
 ISR(INT0_vect)
 {
-    uint16_t now = TCNT1;
-    uint16_t since = now - last_crossing;
-    if (quiet_ticks < TICKS_PER_HALF && since < half_wave - half_wave / 4)
+    if (quiet_ticks < TICKS_PER_HALF - TICKS_PER_HALF / 4)
         return; /* contact noise, not a crossing */
     bool in_time = quiet_ticks <= TICKS_PER_HALF + TICKS_PER_HALF / 4;
-    last_crossing = now;
     quiet_ticks = 0;
     if (!in_time)
         crossings = 0;
@@ -184,22 +220,23 @@ ISR(INT0_vect)
         return;
     }
     pin_off();
-    if (fire_delay != 0) {
-        gate_open = false;
-        OCR1B = now + fire_delay;
-        TIFR1 = _BV(OCF1B);
-        TIMSK1 |= _BV(OCIE1B);
-    }
+    gate_open = false;
+    if (fire_delay != 0)
+        gate_timer_start(fire_delay);
+    else
+        gate_timer_stop();
 }
 
-ISR(TIMER1_COMPB_vect)
+ISR(TIMER2_COMPA_vect)
 {
-    if (!gate_open && power != 0) {
+    if (gate_left != 0) {
+        gate_timer_stretch();
+    } else if (!gate_open && power != 0) {
         gate_open = true;
         pin_on();
-        OCR1B = last_crossing + half_wave - (uint16_t)GATE_MARGIN;
+        gate_timer_start(half_wave - (uint16_t)GATE_MARGIN - fire_delay);
     } else {
         pin_off();
-        TIMSK1 &= (uint8_t)~_BV(OCIE1B);
+        gate_timer_stop();
     }
 }

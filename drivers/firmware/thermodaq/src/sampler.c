@@ -10,11 +10,7 @@
 static volatile uint16_t now_ms;
 static volatile uint8_t conversions;
 
-static uint16_t tick_whole;  /* timer 1 counts between two conversions ... */
-static uint8_t tick_thirds;  /* ... and the thirds of a count that 60 Hz needs on top */
-static uint8_t thirds;
-
-static uint16_t wanted;      /* conversions in a burst */
+static uint16_t wanted; /* conversions in a burst */
 static uint16_t taken;
 static uint16_t began_ms;
 static uint32_t running_sum;
@@ -26,11 +22,11 @@ static volatile uint16_t sequence;
 
 void sampler_configure(uint8_t mains_hz, uint8_t periods)
 {
-    uint32_t three = 3UL * TIMER1_HZ / TICKS_PER_CYCLE / mains_hz;
+    uint16_t rate = (uint16_t)(mains_hz * TICKS_PER_CYCLE);
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
     {
-        tick_whole = (uint16_t)(three / 3);
-        tick_thirds = (uint8_t)(three % 3);
+        OCR1A = (uint16_t)((TIMER1_HZ + rate / 2) / rate - 1); /* 60 Hz: 0.03 % long */
+        TCNT1 = 0;
         wanted = (uint16_t)periods * TICKS_PER_CYCLE;
         taken = 0;
         running_sum = 0;
@@ -51,11 +47,10 @@ void sampler_start(void)
     TIMSK0 = _BV(OCIE0A);
     TCCR0B = _BV(CS01) | _BV(CS00);
 
-    /* Timer 1: free running. */
-    OCR1A = TCNT1 + tick_whole;
+    /* Timer 1: F_CPU / 8, cleared at each match. */
     TIMSK1 = _BV(OCIE1A);
     TCCR1A = 0;
-    TCCR1B = _BV(CS11);
+    TCCR1B = _BV(WGM12) | _BV(CS11);
 }
 
 struct sample sampler_read(void)
@@ -82,13 +77,6 @@ ISR(TIMER0_COMPA_vect)
 
 ISR(TIMER1_COMPA_vect)
 {
-    uint16_t step = tick_whole;
-    thirds += tick_thirds;
-    if (thirds >= 3) {
-        thirds -= 3;
-        step++;
-    }
-    OCR1A += step;
     ADCSRA |= _BV(ADSC);
     heater_tick();
 }
