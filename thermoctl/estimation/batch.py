@@ -20,6 +20,9 @@ from thermoctl.estimation.recursion import ARRAYS, RecursiveLaw, drift
 from thermoctl.quantities import Array
 from thermoctl.signals import Estimate
 
+SANE = 1e10
+"""A run that stays within this rejected nothing, and need not be looked at sample by sample."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
@@ -92,7 +95,7 @@ def run_batch(
     columns = np.ascontiguousarray(np.moveaxis(phi, 1, 2))
     with np.errstate(all="ignore"):  # what overflows here is found in the result
         run = _run(law, y, columns, belief, careful=False)
-        if not _sane(run):
+        if not _sane(phi, run):
             run = _run(law, y, columns, belief, careful=True)
     return run
 
@@ -140,7 +143,8 @@ def _step(
     usable = None
     if careful:
         size = (P * P).sum(axis=(0, 1)) + (theta * theta).sum(axis=0)
-        usable = (S > 0.0) & (S < LARGEST) & (e * e < LARGEST * S) & (size < LARGEST * LARGEST)
+        usable = np.abs(phi).sum(axis=0) < LARGEST
+        usable &= (e * e < LARGEST * S) & (size < LARGEST * LARGEST)
     return _State(theta, P, e, np.broadcast_to(inflation, e.shape), usable)
 
 
@@ -163,10 +167,9 @@ def _kept(old: _State, new: _State, usable: npt.NDArray[np.bool_]) -> _State:
     )
 
 
-def _sane(run: Run) -> bool:
-    """Return whether nothing was, or came near, what `update` rejects; false for NaN."""
-    nearly = LARGEST**0.4
+def _sane(phi: Array, run: Run) -> bool:
+    """Return whether everything is far from what `update` rejects; false for NaN."""
     return all(
-        values.size == 0 or (values.max() < nearly and values.min() > -nearly)
-        for values in (run.innovation, run.theta, run.P)
+        values.size == 0 or (values.max() < SANE and values.min() > -SANE)
+        for values in (phi, run.innovation, run.theta, run.P)
     )

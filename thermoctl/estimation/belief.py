@@ -11,8 +11,11 @@ import numpy.typing as npt
 from thermoctl.quantities import Array, is_finite_number
 from thermoctl.signals import Estimate
 
-LARGEST = 1e150
-"""Beyond this a square overflows: no variance, parameter or scaled innovation is let past it."""
+LARGEST = 1e50
+"""No regressor, parameter, variance or normalised innovation squared is let past this.
+
+It is beyond every meaning, and within it no product in this room can overflow.
+"""
 
 
 def start(n: int, P0: float | npt.ArrayLike = 1.0, theta0: npt.ArrayLike | None = None) -> Estimate:
@@ -73,8 +76,8 @@ def covariance(name: str, value: float | npt.ArrayLike, n: int | None = None) ->
 
 
 def positive(name: str, value: float, at_most: float = LARGEST) -> None:
-    """Raise ``ValueError`` unless `value` is a number in (0, at_most]."""
-    if not is_finite_number(value) or not 0.0 < value <= at_most:
+    """Raise ``ValueError`` unless `value` is a number in [1/LARGEST, at_most]."""
+    if not is_finite_number(value) or not 1.0 / LARGEST <= value <= at_most:
         limit = "" if at_most == LARGEST else f" and at most {at_most:g}"
         raise ValueError(f"{name} must be positive{limit}, got {value!r}")
 

@@ -86,13 +86,15 @@ class RecursiveLaw(ABC):
         theta, P = belief.theta, belief.P
         if phi.shape != theta.shape:
             raise ValueError(f"phi must have shape {theta.shape}, got {phi.shape}")
-        # ndarray.dot, not @: it is twice as fast here, and silent where @ warns of overflow.
-        P_phi = P.dot(phi)
+        # Plain floats add up without a warning; the comparison is false for NaN. Once phi, and
+        # below e, are known to be sane, nothing here can overflow.
+        if not sum(map(abs, phi.tolist())) < LARGEST:
+            return rejected(belief)
+        P_phi = P.dot(phi)  # ndarray.dot, not @: it is twice as fast on small arrays
         e = float(y) - float(theta.dot(phi))
         q = max(float(phi.dot(P_phi)), 0.0)  # rounding can leave a vanishing one below zero
         S, inflation = self.weigh(q, e, len(theta), NUMBERS)
-        # One comparison each, false for NaN: inside, none of the arithmetic below can overflow.
-        if not (0.0 < S < LARGEST and e * e < LARGEST * S):
+        if not e * e < LARGEST * S:
             return rejected(belief)
         root = math.sqrt(S)
         g = P_phi / root

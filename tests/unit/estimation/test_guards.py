@@ -1,0 +1,183 @@
+"""The guards: what they bound, what they pause, what they leave alone."""
+
+import math
+
+import numpy as np
+import pytest
+
+from thermoctl.estimation import (
+    CorrectedKalman,
+    Guarded,
+    RandomWalkKalman,
+    RecursiveLeastSquares,
+    VariableForgetting,
+    run_batch,
+    start,
+)
+
+BARE = [
+    RecursiveLeastSquares(0.98),
+    VariableForgetting(0.5),
+    RandomWalkKalman(0.001, 0.01),
+    CorrectedKalman(0.0, 0.01),
+]
+by_law = pytest.mark.parametrize("law", BARE, ids=lambda law: type(law).__name__)
+
+
+def at_rest(law, belief, samples, seed=4):
+    """Teach `law` a loop at its set point: one regressor, noise as the model says."""
+    rng = np.random.default_rng(seed)
+    phi, noise = np.array([1.0, 0.25, -0.5]), 0.1 * rng.normal(size=samples)
+    for t in range(samples):
+        belief = law.update(belief, phi, 1.0 + float(noise[t]))
+        if t % 97 == 0:
+            yield belief
+    yield belief
+
+
+@by_law
+def test_a_law_without_guards_switched_on_learns_as_the_bare_one(law):
+    rng = np.random.default_rng(0)
+    bare, guarded = start(2), start(2)
+    for _ in range(50):
+        phi, y = rng.normal(size=2), rng.normal()
+        bare, guarded = law.update(bare, phi, y), Guarded(law).update(guarded, phi, y)
+        assert np.array_equal(bare.theta, guarded.theta)
+        assert np.array_equal(bare.P, guarded.P)
+        assert bare.innovation_var == guarded.innovation_var
+
+
+def test_the_bare_corrected_filter_winds_up_without_excitation():
+    beliefs = list(at_rest(CorrectedKalman(R2=0.01), start(3), 2000))
+    assert np.trace(beliefs[-1].P) > 1e6
+
+
+def stays_sound(law, samples):
+    """Assert that P stays positive definite and bounded, and theta near its start."""
+    for belief in at_rest(law, start(3, P0=2.0), samples):
+        assert np.diag(belief.P).max() <= 2.0 * (1 + 1e-12)
+        assert np.array_equal(belief.P, belief.P.T)
+        assert np.linalg.eigvalsh(belief.P)[0] > 0.0
+        assert np.abs(belief.theta).max() < 20.0
+
+
+@pytest.mark.slow
+@by_law
+def test_the_cap_keeps_covariance_sound_for_a_hundred_thousand_samples_at_rest(law):
+    stays_sound(Guarded(law, covariance_max=2.0), 100_000)
+
+
+@pytest.mark.slow
+def test_the_cap_keeps_the_corrected_filter_sound_for_a_million_samples_at_rest():
+    stays_sound(Guarded(CorrectedKalman(R2=0.01), covariance_max=2.0), 1_000_000)
+
+
+@by_law
+def test_the_cap_keeps_covariance_sound_for_ten_thousand_samples_at_rest(law):
+    stays_sound(Guarded(law, covariance_max=2.0), 5_000)
+
+
+def test_the_cap_keeps_correlations():
+    P0 = np.array([[9.0, 2.0], [2.0, 1.0]])
+    law = Guarded(RandomWalkKalman(0.0, 1.0), covariance_max=4.0)
+    P = law.update(start(2, P0), np.zeros(2), 0.0).P
+    np.testing.assert_allclose(P, [[4.0, 2.0 * 2 / 3], [2.0 * 2 / 3, 1.0]])
+    assert not P.flags.writeable
+
+
+def test_learning_pauses_at_rest_and_goes_on_when_the_regressor_moves():
+    law, rng = Guarded(CorrectedKalman(R2=0.01), excitation_min=0.3), np.random.default_rng(2)
+    belief, learned = start(2), []
+    for t in range(600):
+        moving = 200 <= t < 300
+        phi = np.array([1.0 + moving * math.sin(t / 5), 0.05 * rng.normal()])
+        before = belief
+        belief = law.update(belief, phi, 0.7 * phi[0] + 0.1 * rng.normal())
+        learned.append(belief.theta is not before.theta)
+        assert belief.rejected is not learned[-1]
+        assert learned[-1] or belief.P is before.P
+    assert not any(learned[:200])
+    assert all(learned[220:300])
+    assert not any(learned[500:])
+    assert belief.theta[0] == pytest.approx(0.7, abs=0.1)
+
+
+def test_a_paused_sample_still_tells_its_innovation():
+    law = Guarded(CorrectedKalman(), excitation_min=1.0)
+    belief = law.update(start(1, theta0=[2.0]), np.ones(1), 5.0)
+    assert belief.rejected
+    assert (belief.innovation, belief.innovation_var, belief.inflation) == (3.0, 2.0, 1.0)
+
+
+def test_excitation_is_the_spread_of_the_regressor():
+    rng, law = np.random.default_rng(6), Guarded(RecursiveLeastSquares())
+    belief, seen = start(2), []
+    for _ in range(3000):
+        belief = law.update(belief, 40.0 + rng.normal(size=2) * [3.0, 4.0], 0.0)
+        seen.append(belief.excitation**2)
+    assert np.mean(seen[500:]) == pytest.approx(25.0, rel=0.1)
+
+
+@by_law
+def test_a_sample_that_is_not_finite_changes_nothing_but_the_mark(law):
+    law = Guarded(law, covariance_max=1.0, excitation_min=1e-9)
+    belief = law.update(law.update(start(1), np.ones(1), 1.0), np.full(1, 2.0), 1.5)
+    for phi, y in ((np.full(1, math.nan), 1.0), (np.ones(1), math.inf)):
+        after = law.update(belief, phi, y)
+        assert after.rejected
+        assert after.theta is belief.theta
+        assert after._memory is belief._memory
+        assert not law.update(after, np.full(1, 3.0), 1.0).rejected
+
+
+def jumping_pole(runs):
+    """Return O21's simulation (24) and its pole."""
+    a = np.concatenate((np.full(100, -0.9), np.full(100, 0.9), np.full(200, -0.9)))
+    rng, y = np.random.default_rng(24), np.full((401, runs), 10.0)
+    for t in range(400):
+        y[t + 1] = a[t] * y[t] + rng.normal(size=runs)
+    return y, a
+
+
+@pytest.mark.parametrize("R2", [0.01, 100.0])
+def test_a_robust_noise_variance_rescues_a_filter_told_a_hundredfold_wrong_one(R2):
+    y, a = jumping_pole(20)
+    law, square = Guarded(CorrectedKalman(R2=R2), robust_R2=True), []
+    for r in range(20):
+        belief = start(1)
+        for t in range(400):
+            belief = law.update(belief, y[t, r : r + 1], float(y[t + 1, r]))
+            square.append((belief.theta[0] - a[t]) ** 2)
+        assert 0.2 < belief.R2 < 1.8
+    bare = run_batch(CorrectedKalman(R2=R2), y[1:], y[:-1, :, None]).theta[:, :, 0]
+    assert np.mean((bare - a[:, None]) ** 2) > 0.4
+    assert np.mean(square) < 0.11
+
+
+def test_a_robust_noise_variance_of_constant_readings_stays_above_zero():
+    law, belief = Guarded(CorrectedKalman(R2=0.01), robust_R2=True), start(1, theta0=[1.0])
+    for _ in range(100):
+        belief = law.update(belief, np.ones(1), 1.0)
+    assert math.isclose(belief.R2, 1e-8)
+    assert not belief.rejected
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        *(("covariance_max", {"covariance_max": v}) for v in (0.0, -1.0, math.nan)),
+        *(("excitation_min", {"excitation_min": v}) for v in (0.0, -1.0, math.inf)),
+    ],
+)
+def test_a_limit_that_is_not_positive_is_named(name, arguments):
+    with pytest.raises(ValueError, match=name):
+        Guarded(CorrectedKalman(), **arguments)
+
+
+def test_guards_refuse_what_they_cannot_guard():
+    with pytest.raises(ValueError, match="robust_R2"):
+        Guarded(RecursiveLeastSquares(), robust_R2=True)
+    with pytest.raises(TypeError, match="Guarded"):
+        Guarded(Guarded(CorrectedKalman()))
+    with pytest.raises(ValueError, match="phi"):
+        Guarded(CorrectedKalman()).update(start(2), np.ones(3), 1.0)
