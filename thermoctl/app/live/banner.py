@@ -12,6 +12,9 @@ from thermoctl.app.live.model import View
 from thermoctl.app.live.rows import Part, fitted, parted
 from thermoctl.signals import Alarm, Mode, Quality, State
 
+ROOMY = 100
+"""Width from which words are written out."""
+
 _QUALITY_WORDS = {
     Quality.GOOD: "reading is no number",
     Quality.MISSING: "no sample",
@@ -73,6 +76,8 @@ def state_row(view: View, look: Look, width: int) -> Text:
             (words, Role.TEXT),
         ]
     right = [(_age(view), Role.MUTE), ("   ", Role.PAGE), (_clock(view), Role.STRONG)]
+    if sum(len(string) for string, _ in (*left, *right)) >= width:
+        left = left[1:]  # who made it is the first to go
     return parted(look, left, right, width)
 
 
@@ -93,8 +98,9 @@ def why(view: View) -> str:
     return f"{cause} · {waits}"
 
 
-def _alarms(view: View) -> list[Part]:
+def _alarms(view: View, width: int) -> list[Part]:
     """Return what the right end of the second row says of alarms."""
+    acknowledge = "acknowledge" if width >= ROOMY else "ack"
     alarms = view.step.alarms if view.step else ()
     active = [alarm for alarm in alarms if alarm.active]
     if active:
@@ -102,7 +108,7 @@ def _alarms(view: View) -> list[Part]:
         sign = ("■ ", Role.RED) if urgent else ("▲ ", Role.AMBER)
         return [sign, (f"{len(active)} active", Role.TEXT)]
     waiting = sum(not alarm.acknowledged for alarm in alarms)
-    return [("△ ", Role.AMBER), (f"{waiting} to acknowledge", Role.TEXT)] if waiting else []
+    return [("△ ", Role.AMBER), (f"{waiting} to {acknowledge}", Role.TEXT)] if waiting else []
 
 
 def values_row(view: View, look: Look, width: int) -> Text:
@@ -112,7 +118,7 @@ def values_row(view: View, look: Look, width: int) -> Text:
         return fitted(look.text(("■ ", Role.RED), (reason, Role.RED)), width)
     step = view.step
     if step is None:
-        return fitted(look.text((numbers.UNKNOWN, Role.MUTE)), width)
+        return fitted(look.text((f"{numbers.UNKNOWN} no sample yet", Role.MUTE)), width)
     value_c = view.temperature_c
     if math.isnan(value_c):
         words = _QUALITY_WORDS[step.measurement.quality]
@@ -128,11 +134,21 @@ def values_row(view: View, look: Look, width: int) -> Text:
         left += [(numbers.UNKNOWN, Role.STRONG), (" nothing accepted", Role.TEXT)]
     else:
         left += [(numbers.power(view.accepted_power), Role.STRONG)]
+    right = _alarms(view, width)
+    left += _holding(view, width - sum(len(string) for string, _ in (*left, *right)))
+    return parted(look, left, right, width)
+
+
+def _holding(view: View, room: int) -> list[Part]:
+    """Return the power it believes to hold with, if there is room: an alarm comes first."""
     holding = view.beliefs.holding_power
-    if step.mode is not Mode.OFF and holding is not None and math.isfinite(holding):
-        percent = numbers.with_unit(numbers.number(100.0 * holding, 0), "%")
-        left += [(" · holds with ", Role.MUTE), (percent, Role.BLUE)]
-    return parted(look, left, _alarms(view), width)
+    if view.step is None or view.step.mode is Mode.OFF or holding is None:
+        return []
+    percent = numbers.number(100.0 * holding, 0)
+    words, value = " · holds with ", numbers.with_unit(percent, "%")
+    if percent == numbers.UNKNOWN or len(words) + len(value) >= room:
+        return []
+    return [(words, Role.MUTE), (value, Role.BLUE)]
 
 
 def one_line(view: View, look: Look, width: int) -> Text:

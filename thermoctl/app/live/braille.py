@@ -55,6 +55,13 @@ def joined(low: Array, high: Array) -> tuple[Array, Array]:
     )
 
 
+def occupied(dots: Dots) -> Dots:
+    """Return `dots` with every dot of a cell set where any of them is."""
+    rows, columns = dots.shape[0] // DOTS_HIGH, dots.shape[1] // DOTS_WIDE
+    some = dots.reshape(rows, DOTS_HIGH, columns, DOTS_WIDE).any(axis=(1, 3))
+    return np.repeat(np.repeat(some, DOTS_HIGH, axis=0), DOTS_WIDE, axis=1)
+
+
 def cells(dots: Dots, *, utf8: bool, mark: str = "*") -> list[str]:
     """Return the grid as one string a row; a space where a cell is empty.
 

@@ -36,7 +36,7 @@ class Frame:
 
     Parameters
     ----------
-    table : ndarray, shape (14, 2 * cells)
+    table : ndarray, shape (12, 2 * cells)
         The run, a dot column each; rows as in `thermoctl.app.live.trend`.
     left_s, cell_s : float
         Loop time of the left edge, and length of a cell.
@@ -128,7 +128,7 @@ def _unknown_end(chart: Frame, grid: Grid) -> None:
         return
     begin = max(0, chart.cell_at(chart.view.last_good_s) + 1)
     for row in range(grid.rows):
-        grid.put(row, begin, "╱" * (chart.cells - begin), Role.MUTE)
+        grid.put(row, begin, "╱" * (chart.cells - begin), Role.RULE)
 
 
 def temperature(chart: Frame, rows: int) -> list[Text]:
@@ -136,7 +136,7 @@ def temperature(chart: Frame, rows: int) -> list[Text]:
     view, look, scale = chart.view, chart.look, chart.view.scale
     grid, dots = Grid(rows, chart.cells), rows * braille.DOTS_HIGH
     labels, gutters = [""] * rows, [("", Role.PAGE)] * rows
-    if scale.last == scale.first:
+    if not scale.known:
         words = "no data yet"
         grid.put(rows // 2, (chart.cells - len(words)) // 2, words, Role.MUTE)
         return [chart.row("", grid, row, ("", Role.PAGE)) for row in range(rows)]
@@ -185,7 +185,14 @@ def deviation(chart: Frame, rows: int) -> list[Text]:
     def level(values: Array) -> Array:
         return braille.heights(values, -DEVIATION_SCALE_MK, DEVIATION_SCALE_MK, dots)
 
-    grid.paint(_curve(level(low_mk), level(high_mk), rows, look), Role.INK)
+    even = np.arange(2 * chart.cells) % 2 == 0
+    limits = braille.blank(rows, chart.cells)
+    for band_mk in (DEVIATION_BAND_MK, -DEVIATION_BAND_MK):
+        limits[dots - 1 - int(level(np.array(band_mk))), even] = True
+    curve = braille.envelope(*braille.joined(level(low_mk), level(high_mk)), dots)
+    # The dots of the band go on through the cells of the curve, or it would hide its own limits.
+    drawn = curve | (limits & braille.occupied(curve))
+    grid.paint(braille.cells(drawn, utf8=look.utf8), Role.INK)
     known = ~np.isnan(low_mk)
     above = _off_scale(chart, low_mk > DEVIATION_SCALE_MK, known)
     below = _off_scale(chart, high_mk < -DEVIATION_SCALE_MK, known)
@@ -193,9 +200,7 @@ def deviation(chart: Frame, rows: int) -> list[Text]:
     grid.put(rows - 1, 0, below.replace("x", "▾"), Role.MUTE)
     _changes(chart, grid, named=False)
     _unknown_end(chart, grid)
-    for band_mk in (DEVIATION_BAND_MK, -DEVIATION_BAND_MK):
-        levels = np.full(2 * chart.cells, float(level(np.array(band_mk))))
-        grid.paint(_dotted(levels, rows, 2, look), Role.MUTE)
+    grid.paint(braille.cells(limits, utf8=look.utf8, mark="."), Role.MUTE)
 
     labels, gutters = [""] * rows, [("", Role.PAGE)] * rows
     labels[0], labels[-1] = "+100", "−100"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from thermoctl.app.live.keys import Action
@@ -37,6 +38,7 @@ class Desk:
     def __init__(self, facts: Facts) -> None:
         self._facts = facts
         self._proposed: Mode | None = None
+        self._in_force_c = self._asked_c = math.nan
 
     @property
     def prompt(self) -> str:
@@ -60,8 +62,13 @@ class Desk:
         step_k = _SETPOINT_STEPS_K.get(action)
         if step_k is None:
             return None
-        asked_c = round(setpoint_c + step_k, 1)
-        return SetPoint(clamp(asked_c, self._facts.setpoint_low_c, self._facts.setpoint_high_c))
+        if setpoint_c != self._in_force_c:
+            self._in_force_c = self._asked_c = setpoint_c
+        # From what was asked last, so that quick strokes add up before the loop takes the first.
+        asked_c = round(self._asked_c + step_k, 1)
+        low_c, high_c = self._facts.setpoint_low_c, self._facts.setpoint_high_c
+        self._asked_c = clamp(asked_c, low_c, high_c)
+        return SetPoint(self._asked_c)
 
     def _next(self, mode: Mode) -> Mode | None:
         """Return Off, to act at once, or propose the mode that comes next."""

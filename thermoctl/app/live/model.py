@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -83,7 +82,7 @@ class Whiteness:
         return "nearly white" if abs(self.autocorrelation) <= 2.0 * self.limit else "not white"
 
 
-def whiteness(innovations: Sequence[float] | Array) -> Whiteness | None:
+def whiteness(innovations: Array) -> Whiteness | None:
     """Return how white `innovations` are; None before `FEWEST` neighbouring pairs.
 
     The mean is not taken off: innovations of a right model have mean zero, and one that keeps its
@@ -92,10 +91,10 @@ def whiteness(innovations: Sequence[float] | Array) -> Whiteness | None:
 
     Parameters
     ----------
-    innovations : sequence of float
+    innovations : ndarray, shape (N,)
         Oldest first, in units of their own σ; NaN breaks a pair.
     """
-    e = np.asarray(innovations, dtype=np.float64)
+    e = innovations
     paired = np.isfinite(e[:-1]) & np.isfinite(e[1:])
     count = int(paired.sum())
     power = float(np.mean(np.square(e[np.isfinite(e)]))) if count else 0.0
@@ -105,27 +104,26 @@ def whiteness(innovations: Sequence[float] | Array) -> Whiteness | None:
     return Whiteness(r1, 2.0 / math.sqrt(count))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Recent:
     """Figures of the last samples; NaN where too few are known.
 
     Parameters
     ----------
-    innovation : float
-        The last one, in its own σ.
+    innovations : ndarray
+        The last ones, oldest first, each in its own σ; NaN where a sample was not used.
     whiteness : Whiteness or None
         None when it cannot be judged yet.
     deviation_sd_k, deviation_max_k : float
-        From the set point, over `deviation_s`.
+        From the set point, over `DEVIATION_SAMPLES`.
     tick_us, tick_99_us : float
         CPU time of the last cycle, and what 99 % of the recent ones stayed below.
     """
 
-    innovation: float
+    innovations: Array
     whiteness: Whiteness | None
     deviation_sd_k: float
     deviation_max_k: float
-    deviation_s: float
     tick_us: float
     tick_99_us: float
 
@@ -222,15 +220,14 @@ class LiveModel:
         if self._first_s != self._first_s:
             self._first_s = step.t_s
         deviation_k = temperature_c - step.setpoint_c
-        innovation = _in_sigma(step)
-        self._innovations.append(innovation)
+        self._innovations.append(_in_sigma(step))
         self._deviations_k.append(deviation_k)
         self._ticks_us.append(cycle.tick_us)
         self._scale.grow(temperature_c)
         self._scale.grow(step.setpoint_c)
         self._recorder.add(
             step.t_s,
-            (temperature_c, 1e3 * deviation_k, innovation),
+            (temperature_c, 1e3 * deviation_k),
             (
                 cycle.accepted_power,
                 step.estimate.inflation,
@@ -271,13 +268,13 @@ class LiveModel:
         deviations = deviations[np.isfinite(deviations)]
         ticks = np.array(self._ticks_us)
         ticks = ticks[np.isfinite(ticks)]
+        innovations = np.array(self._innovations)
         enough = deviations.size >= FEWEST
         return Recent(
-            innovation=self._innovations[-1] if self._innovations else _NAN,
-            whiteness=whiteness(self._innovations),
+            innovations=innovations,
+            whiteness=whiteness(innovations),
             deviation_sd_k=float(deviations.std()) if enough else _NAN,
             deviation_max_k=float(np.abs(deviations).max()) if enough else _NAN,
-            deviation_s=len(self._deviations_k) * self.facts.period_s,
             tick_us=self._ticks_us[-1] if self._ticks_us else _NAN,
             tick_99_us=float(np.quantile(ticks, 0.99)) if ticks.size >= FEWEST else _NAN,
         )

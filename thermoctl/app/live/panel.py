@@ -9,12 +9,13 @@ import numpy as np
 from rich.text import Text
 
 from thermoctl.app.live import braille, numbers, trend
+from thermoctl.app.live.banner import ROOMY
 from thermoctl.app.live.look import Look, Role
 from thermoctl.app.live.model import FEWEST, View
 from thermoctl.app.live.rows import Part, fitted
 from thermoctl.quantities import Array
 
-_VALUE, _ERROR, _UNIT = 8, 9, 6
+_VALUE, _ERROR, _UNIT = 8, 9, 7
 _SPARK_SIGMAS = 3.0
 _DOTS = braille.DOTS_HIGH
 
@@ -60,8 +61,6 @@ def _spark(view: View, look: Look, cells: int, row: int, least: float) -> str:
 
     The least height is the error bar, so that a line that wanders within it looks flat.
     """
-    if cells < 4:
-        return ""
     values = _columns(view, cells)[row]
     known = values[np.isfinite(values)]
     if not known.size or not math.isfinite(least):
@@ -112,21 +111,20 @@ def _belief_items(view: View, look: Look, cells: int) -> list[Item]:
 
 
 def _innovation_item(view: View, look: Look, cells: int) -> Item:
-    """Return the last innovation in its own σ, with its envelope within ±3σ."""
+    """Return the last innovation in its own σ, after those before it, a dot each within ±3σ."""
     label, short = "Innovation", "Innov."
-    digits = numbers.number(view.recent.innovation, 1, signed=True)
+    recent = view.recent.innovations
+    digits = numbers.number(float(recent[-1]), 1, signed=True) if recent.size else numbers.UNKNOWN
     if digits == numbers.UNKNOWN:
-        used = view.step is not None and view.step.estimate.rejected
-        reason = "last sample not used" if used else _no_belief(view)
-        return _unknown(label, short, reason)
-    if cells < 4:
-        return Item(label, short, digits, "", "σ")
-    table = np.clip(_columns(view, cells), -_SPARK_SIGMAS, _SPARK_SIGMAS)
-    low, high = (
-        braille.heights(table[row], -_SPARK_SIGMAS, _SPARK_SIGMAS, _DOTS)
-        for row in (trend.INNOVATION_LOW, trend.INNOVATION_HIGH)
+        unused = view.step is not None and view.step.estimate.rejected
+        return _unknown(label, short, "last sample not used" if unused else _no_belief(view))
+    shown = np.full(2 * cells, np.nan)
+    last = recent[-shown.size :]
+    shown[shown.size - last.size :] = last
+    level = braille.heights(
+        np.clip(shown, -_SPARK_SIGMAS, _SPARK_SIGMAS), -_SPARK_SIGMAS, _SPARK_SIGMAS, _DOTS
     )
-    spark = braille.cells(braille.envelope(low, high, _DOTS), utf8=look.utf8)[0]
+    spark = braille.cells(braille.envelope(level, level, _DOTS), utf8=look.utf8)[0]
     return Item(label, short, digits, "", "σ", spark, Role.BLUE)
 
 
@@ -157,9 +155,9 @@ def _health_items(view: View, look: Look, cells: int) -> list[Item]:
     if math.isnan(recent.deviation_sd_k):
         items.append(_unknown("Deviation sd", "Dev. sd", f"after {FEWEST} good samples"))
     else:
-        value = numbers.number(1e3 * recent.deviation_sd_k, 0)
-        worst = f"max {numbers.number(1e3 * recent.deviation_max_k, 0)}{numbers.NBSP}mK"
-        items.append(Item("Deviation sd", "Dev. sd", value, unit="mK", tail=worst))
+        value, unit = numbers.difference(recent.deviation_sd_k).lstrip("+").split(numbers.NBSP)
+        worst = f"max {numbers.difference(recent.deviation_max_k).lstrip('+')}"
+        items.append(Item("Deviation sd", "Dev. sd", value, unit=unit, tail=worst))
     tick = numbers.number(recent.tick_us, 0)
     slow = numbers.number(recent.tick_99_us, 0)
     tail = "" if slow == numbers.UNKNOWN else f"99 % {slow}{numbers.NBSP}µs"
@@ -200,7 +198,7 @@ def note(view: View) -> str:
 
 def beliefs(view: View, look: Look, width: int) -> list[Text]:
     """Return the four rows of beliefs."""
-    wide = width >= 100
+    wide = width >= ROOMY
     left_label, right_label = (11, 14) if wide else (8, 8)
     left = width * 54 // 100 if wide else width // 2 + 2
     spark_left = left - left_label - _VALUE - 1 - _ERROR - _UNIT - (3 if wide else 2)

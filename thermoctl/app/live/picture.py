@@ -18,7 +18,7 @@ from thermoctl.app.live.look import Look, Role
 _CELL_WIDE, _CELL_HIGH = 8.4, 17.0
 _SIZE, _BASELINE = 14.0, 12.6
 _MARGIN = 12.0
-_DOT = 1.9
+_DOT = 2.2
 _FONTS = "ui-monospace, 'DejaVu Sans Mono', Menlo, Consolas, monospace"
 _DOT_PLACES = ((0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (0, 3), (1, 3))
 """Column and row of each braille dot, in the order of its bit."""
@@ -82,7 +82,7 @@ def _line(line: Text, top: float, page: str) -> Iterator[str]:
         if ground != page:
             yield (
                 f'<rect x="{left:.1f}" y="{top:.1f}" width="{len(string) * _CELL_WIDE:.1f}" '
-                f'height="{_CELL_HIGH:.1f}" fill="{ground}"/>'
+                f'height="{_CELL_HIGH:.1f}" fill="{ground}" shape-rendering="crispEdges"/>'
             )
         points = _dots(string, left, top)
         if points:

@@ -19,7 +19,6 @@ from thermoctl.app.live.sentences import Mark, Sentence
 LEAST_WIDTH, LEAST_HEIGHT = 80, 24
 
 _MARK_ROLES = {Mark.WARNING: Role.AMBER, Mark.ALARM: Role.RED, Mark.CHANGE: Role.BLUE}
-_TIGHT_BELOW = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +61,7 @@ def _keys(view: View, look: Look, width: int) -> Text:
     """Return the row of keys, or the question that is open."""
     if view.prompt:
         return fitted(look.text((f" {view.prompt} ", Role.CHIP)), width)
-    tight = width < _TIGHT_BELOW
+    tight = width < banner.ROOMY
     keys = [("↑↓", "set" if tight else "set point"), ("m", "mode")]
     if view.facts.simulated:
         keys += [("d", "cold" if tight else "cold water"), ("i", "ice")]

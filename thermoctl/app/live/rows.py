@@ -28,6 +28,7 @@ def parted(
     first, last = look.text(*left, ground=ground), look.text(*right)
     gap = width - first.cell_len - last.cell_len
     if gap < (1 if last.cell_len else 0):
+        first.truncate(width, overflow="ellipsis" if look.utf8 else "crop")
         return fitted(first, width)
     first.append(" " * gap)
     first.append_text(last)

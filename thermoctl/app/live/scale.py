@@ -22,7 +22,7 @@ _TICKS_S = (
 )
 
 _COLDEST_C, _HOTTEST_C = -273.0, 3000.0  # a reading outside of this does not spoil the axis
-_STEPS_MOST = 4
+_STEPS_MOST = 16
 
 
 def range_for(elapsed_s: float) -> float:
@@ -44,17 +44,17 @@ def next_step(step: float) -> float:
 
 @dataclass(slots=True)
 class Scale:
-    """The axis of the temperature chart: whole steps, at most four of them.
+    """The axis of the temperature chart: whole steps, at most sixteen of them.
 
     Parameters
     ----------
     step : float
-        Distance of two labels in °C, of the series 1, 2, 5.
+        What the axis grows by in °C, of the series 1, 2, 5.
     first, last : int
         The axis runs from ``first * step`` to ``last * step``; equal while nothing is known.
     """
 
-    step: float = 0.5
+    step: float = 0.1
     first: int = 0
     last: int = 0
 
@@ -62,33 +62,40 @@ class Scale:
         """Return the axis as it is now."""
         return Scale(self.step, self.first, self.last)
 
-    def grow(self, value_c: float) -> None:
-        """Make room for `value_c`; what is not a believable temperature is passed over."""
-        if not _COLDEST_C <= value_c <= _HOTTEST_C or self.low <= value_c <= self.high:
-            return
-        known = self.last > self.first
-        low = min(self.low, value_c) if known else value_c
-        high = max(self.high, value_c) if known else value_c
-        while True:
-            first = math.floor(low / self.step + 1e-9)
-            last = max(math.ceil(high / self.step - 1e-9), first + 1)
-            if last - first <= _STEPS_MOST:
-                break
-            self.step = next_step(self.step)
-        self.first, self.last = first, last
+    @property
+    def known(self) -> bool:
+        """Return whether there is anything to show."""
+        return self.last > self.first
 
     @property
     def low(self) -> float:
         """Return the temperature at the bottom; above `high` while nothing is known."""
-        return self.first * self.step if self.last > self.first else math.inf
+        return self.first * self.step if self.known else math.inf
 
     @property
     def high(self) -> float:
         """Return the temperature at the top."""
-        return self.last * self.step if self.last > self.first else -math.inf
+        return self.last * self.step if self.known else -math.inf
+
+    def grow(self, value_c: float) -> None:
+        """Make room for `value_c`; what is not a believable temperature is passed over."""
+        if not _COLDEST_C <= value_c <= _HOTTEST_C or self.low <= value_c <= self.high:
+            return
+        low, high = min(self.low, value_c), max(self.high, value_c)
+        while True:
+            self.first = math.floor(low / self.step + 1e-9)
+            self.last = max(math.ceil(high / self.step - 1e-9), self.first + 1)
+            if self.last - self.first <= _STEPS_MOST:
+                return
+            self.step = next_step(self.step)
 
     def labels(self) -> list[tuple[float, str]]:
         """Return every labelled temperature with its label, from the bottom up."""
-        decimals = max(0, -math.floor(math.log10(self.step) + 1e-9))
-        steps = range(self.first, self.last + 1) if self.last > self.first else range(0)
-        return [(i * self.step, f"{i * self.step:.{decimals}f}".replace("-", "−")) for i in steps]
+        if not self.known:
+            return []
+        apart = next_step(next_step(self.step))
+        decimals = max(0, -math.floor(math.log10(apart) + 1e-9))
+        first = math.ceil(self.low / apart - 1e-9)
+        last = math.floor(self.high / apart + 1e-9)
+        values = [i * apart for i in range(first, last + 1)]
+        return [(value, f"{value:.{decimals}f}".replace("-", "−")) for value in values]

@@ -32,67 +32,57 @@ class Sentence:
 # Richest template first; the first one whose fields are all there is used. Units come with the
 # fields: see `thermoctl.app.live.numbers.quantity`.
 _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
-    "loop.started": (Mark.NONE, ("Loop started at {temperature_c}", "Loop started")),
-    "loop.stopped": (Mark.NONE, ("Loop stopped, heater off",)),
-    "mode.changed": (Mark.NONE, ("Mode {mode}, was {before}", "Mode {mode}", "Mode changed")),
-    "setpoint.changed": (
-        Mark.NONE,
-        ("Set point {setpoint_c}, was {before_c}", "Set point {setpoint_c}", "Set point {value_c}"),
-    ),
-    "state.changed": (
-        Mark.NONE,
-        ("State {state}, was {before}: {reason}", "State {state}: {reason}", "State {state}"),
-    ),
-    "sensor.open": (Mark.WARNING, ("Sensor open: broken wire or loose plug",)),
-    "sensor.short": (Mark.WARNING, ("Sensor short-circuited",)),
-    "sensor.missing": (Mark.WARNING, ("No sample from the sensor",)),
-    "sensor.stale": (Mark.WARNING, ("Sensor value is old: {age_s}", "Sensor value is old")),
-    "sensor.frozen": (Mark.WARNING, ("Sensor value stands still",)),
-    "sensor.spike": (
-        Mark.WARNING,
-        ("One reading out of line, {temperature_c}, ignored", "One reading out of line, ignored"),
-    ),
-    "sensor.recovered": (Mark.NONE, ("Sensor is back",)),
-    "trip.over_temperature": (
-        Mark.ALARM,
-        ("Too hot: {temperature_c}, heater off above {limit_c}", "Too hot: heater off"),
-    ),
-    "trip.under_temperature": (
-        Mark.ALARM,
-        ("Too cold: {temperature_c}, heater off below {limit_c}", "Too cold: heater off"),
-    ),
     "alarm.acknowledged": (Mark.NONE, ("Acknowledged: {code}", "Alarms acknowledged")),
-    "alarm.deviation": (Mark.WARNING, ("Deviation beyond {limit_k}", "Deviation beyond the limit")),
-    "latch.cleared": (Mark.NONE, ("Latch cleared: {code}", "Latch cleared")),
-    "estimator.reset": (Mark.WARNING, ("Estimator back to its last good belief",)),
-    "estimator.rejected": (Mark.NONE, ("Estimator refused a sample",)),
-    "learning.paused": (Mark.NONE, ("Learning paused: nothing to learn",)),
-    "learning.resumed": (Mark.NONE, ("Learning again",)),
-    "controller.failed": (
-        Mark.ALARM,
-        ("Controller failed, heater off: {error}", "Controller failed, heater off"),
-    ),
-    "control.settled": (
-        Mark.NONE,
-        ("Settled: {setpoint_c}, overshoot {overshoot_k}", "Settled at the set point"),
-    ),
-    "control.recovered": (Mark.NONE, ("Back within {band_k} after {after_s}", "Back at set point")),
+    "board.lost": (Mark.WARNING, ("Board {board} is lost: {error}", "Board is lost")),
+    "board.opened": (Mark.NONE, ("Board {board} answers: {kind} {version}", "Board answers")),
+    "board.retry": (Mark.NONE, ("Board {board} asked again", "Board asked again")),
+    "board.silent": (Mark.WARNING, ("Board {board} is silent: {error}", "Board is silent")),
+    "board.wrong": (Mark.ALARM, ("Not board {board}: {error}", "Another device answers")),
     "change.detected": (Mark.CHANGE, ("{text}", "The water has jumped")),
-    "output.nan": (Mark.WARNING, ("The law gave no number: power 0",)),
-    "output.refused": (Mark.WARNING, ("The board refused the power: {error}", "Power refused")),
-    "output.readback": (Mark.WARNING, ("Power read back differs from the command",)),
-    "board.opened": (Mark.NONE, ("Board answers: {board}", "Board answers")),
-    "board.lost": (Mark.WARNING, ("Board does not answer: {error}", "Board does not answer")),
-    "board.retry": (Mark.NONE, ("Asked the board again", "Asked the board again")),
-    "board.wrong": (Mark.ALARM, ("Another device answers: {error}", "Another device answers")),
-    "cycle.late": (Mark.NONE, ("Woke late by {late_s}", "Woke late")),
-    "cycle.missed": (Mark.WARNING, ("Cycles missed: {missed}", "A cycle was missed")),
-    "cycle.failed": (Mark.ALARM, ("Cycle failed, heater off: {error}", "Cycle failed, heater off")),
-    "history.set_aside": (Mark.WARNING, ("History was damaged, a new one is begun",)),
-    "history.drops": (Mark.WARNING, ("History left out samples: {dropped}", "History drops")),
     "clock.stepped": (Mark.NONE, ("Wall clock stepped by {step_s}", "Wall clock stepped")),
     "config.loaded": (Mark.NONE, ("Settings loaded: {path}", "Settings loaded")),
-    "sim.disturbed": (Mark.NONE, ("{text}", "Disturbed")),
+    "control.recovered": (
+        Mark.NONE,
+        ("Back within ±{band_k} after {after_s}", "Back at set point"),
+    ),
+    "control.settled": (Mark.NONE, ("Settled, overshoot {overshoot_k}", "Settled at set point")),
+    "controller.failed": (
+        Mark.ALARM,
+        ("Controller failed: {text}", "Controller failed, heater off"),
+    ),
+    "cycle.failed": (Mark.ALARM, ("Cycle failed, heater off: {error}", "Cycle failed, heater off")),
+    "cycle.late": (Mark.NONE, ("Woke {late_s} late", "Woke late")),
+    "cycle.missed": (Mark.WARNING, ("Cycles missed: {cycles}, in all {total}", "Cycles missed")),
+    "estimator.rejected": (Mark.NONE, ("Estimator refused a sample",)),
+    "estimator.reset": (Mark.WARNING, ("Back to the last good belief",)),
+    "history.drops": (Mark.WARNING, ("History leaves samples out",)),
+    "history.set_aside": (Mark.WARNING, ("Damaged history set aside, a new one begun",)),
+    "latch.cleared": (Mark.NONE, ("Latch cleared: {code}", "Latch cleared")),
+    "learning.paused": (Mark.NONE, ("Learning paused: nothing to learn",)),
+    "learning.resumed": (Mark.NONE, ("Learning again",)),
+    "loop.started": (Mark.NONE, ("Loop started at {temperature_c}", "Loop started")),
+    "loop.stopped": (Mark.NONE, ("Loop stopped, heater off",)),
+    "mode.changed": (Mark.NONE, ("Mode {after}, was {before}", "Mode changed")),
+    "output.nan": (Mark.WARNING, ("No number from {controller}: power 0", "No number: power 0")),
+    "output.readback": (Mark.WARNING, ("Output differs: {text}", "Output differs from command")),
+    "output.refused": (Mark.WARNING, ("Output refused: {text}", "Output refused")),
+    "request.refused": (Mark.WARNING, ("Refused: {why}", "Request refused")),
+    "sensor.missing": (Mark.WARNING, ("No sample: {text}", "No sample from the sensor")),
+    "sensor.open": (Mark.WARNING, ("Sensor open: {text}", "Sensor open")),
+    "sensor.short": (Mark.WARNING, ("Sensor shorted: {text}", "Sensor shorted")),
+    "sensor.spike": (
+        Mark.WARNING,
+        ("One bad reading, {temperature_c}, ignored", "One bad reading"),
+    ),
+    "sensor.stale": (Mark.WARNING, ("Old sample: {text}", "Old sample")),
+    "setpoint.changed": (Mark.NONE, ("Set point {after_c}, was {before_c}", "Set point changed")),
+    "sim.disturbed": (Mark.NONE, ("{text}", "Plant disturbed")),
+    "state.changed": (
+        Mark.NONE,
+        ("State {after}, was {before}: {why}", "State {after}, was {before}", "State changed"),
+    ),
+    "trip.over_temperature": (Mark.ALARM, ("Too hot: {text}", "Too hot, heater off")),
+    "trip.under_temperature": (Mark.ALARM, ("Too cold: {text}", "Too cold, heater off")),
 }
 
 _STATE_MARKS = {
@@ -103,23 +93,30 @@ _STATE_MARKS = {
 }
 
 
+_PLAIN_WORDS = frozenset({"text", "why", "error"})
+
+
 def _described(event: Event, fields: Mapping[str, str]) -> str:
     """Return words for an event no sentence is known for."""
-    head = event.name.replace("_", " ").replace(".", ": ", 1).replace(".", " ")
-    tail = ", ".join(f"{name} {value}" for name, value in fields.items())
-    words = f"{head} ({tail})" if tail else head
+    head = event.name.replace("_", " ").replace(".", " ")
+    tail = ", ".join(
+        value if name in _PLAIN_WORDS else f"{name} {value}" for name, value in fields.items()
+    )
+    words = f"{head}: {tail}" if tail else head
     return words[:1].upper() + words[1:]
 
 
 def sentence(event: Event) -> Sentence:
     """Return `event` as a person reads it; an unknown name is spelt out with its fields."""
     fields = {name: quantity(name, value) for name, value in event.fields.items()}
-    mark, templates = _SENTENCES.get(event.name, (Mark.NONE, ()))
+    unlisted = Mark.WARNING if event.name.startswith("alarm.") else Mark.NONE
+    mark, templates = _SENTENCES.get(event.name, (unlisted, ()))
     if event.name == "state.changed":
-        mark = _STATE_MARKS.get(fields.get("state", ""), mark)
+        mark = _STATE_MARKS.get(fields.get("after", ""), mark)
     for template in templates:
         try:
-            return Sentence(event.t_s, event.name, template.format_map(fields), mark)
+            words = template.format_map(fields)
+            return Sentence(event.t_s, event.name, words[:1].upper() + words[1:], mark)
         except KeyError:
             continue
     return Sentence(event.t_s, event.name, _described(event, fields), mark)

@@ -21,10 +21,8 @@ CAPACITY = 4096
 (
     TEMPERATURE_LOW,
     DEVIATION_LOW,
-    INNOVATION_LOW,
     TEMPERATURE_HIGH,
     DEVIATION_HIGH,
-    INNOVATION_HIGH,
     POWER_HIGH,
     INFLATION_HIGH,
     POWER_SUM,
@@ -33,9 +31,9 @@ CAPACITY = 4096
     GAIN,
     POLE,
     HOLDING,
-) = range(14)
-_LOWS, _HIGHS, _SUMS, _LASTS = slice(0, 3), slice(3, 8), slice(8, 10), slice(10, 14)
-_EMPTY = (math.nan,) * 8 + (0.0, 0.0) + (math.nan,) * 4
+) = range(12)
+_LOWS, _HIGHS, _SUMS, _LASTS = slice(0, 2), slice(2, 6), slice(6, 8), slice(8, 12)
+_EMPTY = (math.nan,) * 6 + (0.0, 0.0) + (math.nan,) * 4
 
 
 def _merge(table: Array, starts: npt.NDArray[np.intp]) -> Array:
@@ -59,7 +57,7 @@ class Trend:
         Loop time of the left edge of the first bucket; NaN before the first sample.
     width_s : float
         Length of a bucket.
-    table : ndarray, shape (14, buckets)
+    table : ndarray, shape (12, buckets)
         The rows are named by this module's constants; NaN where there was no sample.
     """
 
@@ -80,7 +78,7 @@ class Trend:
 
         Returns
         -------
-        ndarray, shape (14, count)
+        ndarray, shape (12, count)
             Each column reduces every bucket it touches.
         """
         result = np.tile(np.array(_EMPTY)[:, None], (1, count))
@@ -115,15 +113,15 @@ class TrendRecorder:
         self._open = list(_EMPTY)
         self._at = 0
 
-    def add(self, t_s: float, lows: tuple[float, ...], rest: tuple[float, ...]) -> None:
+    def add(self, t_s: float, pair: tuple[float, float], rest: tuple[float, ...]) -> None:
         """Take one sample.
 
         Parameters
         ----------
         t_s : float
             Loop time; a sample older than the open bucket is not taken.
-        lows : tuple of 3 floats
-            Temperature in °C, deviation in mK, innovation in its own σ.
+        pair : tuple of 2 floats
+            Temperature in °C and deviation in mK, of which both extremes are kept.
         rest : tuple of 6 floats
             Power, inflation, set point, gain, pole, holding power. NaN is unknown, everywhere.
         """
@@ -141,18 +139,18 @@ class TrendRecorder:
         if at != self._at:
             self._table[:, self._at] = self._open
             self._open, self._at = list(_EMPTY), at
-        self._extend(lows, rest)
+        self._extend(pair, rest)
 
-    def _extend(self, lows: tuple[float, ...], rest: tuple[float, ...]) -> None:
+    def _extend(self, pair: tuple[float, float], rest: tuple[float, ...]) -> None:
         """Widen the open bucket by one sample."""
         row = self._open
-        for i, value in enumerate(lows):
+        for i, value in enumerate(pair):
             # Comparisons are turned so that a NaN in the bucket is replaced, one coming is not.
             if value == value:
                 if not row[i] <= value:
                     row[i] = value
-                if not row[i + 3] >= value:
-                    row[i + 3] = value
+                if not row[TEMPERATURE_HIGH + i] >= value:
+                    row[TEMPERATURE_HIGH + i] = value
         power, inflation = rest[0], rest[1]
         if power == power:
             row[POWER_SUM] += power
