@@ -14,6 +14,7 @@ import click
 from rich.console import Console
 
 from thermoctl.app.settings import load
+from thermoctl.app.sim import profile, simulate
 from thermoctl.model.arx import Arx
 from thermoctl.studies.csv_record import read_csv
 from thermoctl.studies.experiment import Run, measure, run_from_cycles
@@ -33,9 +34,6 @@ from thermoctl.studies.replay_figure import draw_replay
 
 PLAIN_WIDTH = 120
 """Columns of a table that goes into a file or a pipe."""
-
-PROFILE = Path(__file__).parents[2] / "config" / "ozbek2021.toml"
-"""The experiment of O21 as a configuration."""
 
 _UNITS_S = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
@@ -225,10 +223,7 @@ def experiment_command(
 
 def _simulated(reference_time_s: float | None, duration_s: float, seed: int) -> Run:
     """Run the paper's experiment on the simulated rig, at full speed."""
-    from thermoctl.app.sim import simulate
-
-    with PROFILE.open("rb") as stream:
-        content = tomllib.load(stream)
+    content = tomllib.loads(profile("ozbek2021").read_text(encoding="utf-8"))
     if reference_time_s is not None:
         for loop in content["loops"].values():
             law = loop["controller"]

@@ -32,11 +32,9 @@ def draw_experiment(run: Run, measures: Measures, title: str, paths: list[Path])
     grid = {"sharex": "col", "height_ratios": (1.5, 1.0, 1.2)}
     with house.styled(house.WIDE_IN, _HEIGHT_IN, 3, 2, **grid) as (figure, axes):
         figure.subplots_adjust(
-            left=0.085, right=0.9, top=0.87, bottom=0.085, hspace=0.36, wspace=0.2
+            left=0.11, right=0.9, top=0.885, bottom=0.085, hspace=0.36, wspace=0.27
         )
-        figure.text(
-            0.085, 0.965, title, fontsize=9, fontweight="bold", color=house.INK, va="center"
-        )
+        figure.text(0.11, 0.97, title, fontsize=9, fontweight="bold", color=house.INK, va="center")
         whole, close = slice(0, len(run.t_s)), _detail(run)
         for column, part in enumerate((whole, close)):
             _draw_output(run, part, axes[0, column])
@@ -112,7 +110,7 @@ def _write_words(run: Run, measures: Measures, axes: Any) -> None:
     for index, panel in enumerate(axes.flat):
         house.letter(panel, "abcdef"[index])
     axes[0, 0].set_ylabel("output, °C")
-    axes[1, 0].set_ylabel("input, % of full power")
+    axes[1, 0].set_ylabel("input, %")
     axes[2, 0].set_ylabel("estimate of $a(t)$")
     bottom, top = axes[0, 1].get_ylim()
     names = [
@@ -149,5 +147,9 @@ def _regulation_words(measures: Measures) -> str:
     if measures.bias_k is None or measures.deviation_k is None:
         return ""
     if measures.cycle_k is None:
-        return f"sd {1e3 * measures.deviation_k:.0f} mK, bias {1e3 * measures.bias_k:+.0f} mK"
+        return (
+            f"sd {1e3 * measures.deviation_k:.0f} mK, bias {1e3 * measures.bias_k:+.0f} mK".replace(
+                "-", "−"
+            )
+        )
     return f"cycle {measures.cycle_k:.2f} K every {measures.cycle_period_s:.0f} s"

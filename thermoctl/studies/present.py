@@ -160,8 +160,13 @@ def print_experiment(console: Console, title: str, measures: Measures) -> None:
     table.add_column(no_wrap=True)
     table.add_column(justify="right", no_wrap=True)
     table.add_column(no_wrap=True)
-    for name, value, unit in _measure_rows(measures):
-        table.add_row(name, "–" if value is None else value.replace("-", "−"), unit)
+    why = "no swing that comes back regularly"
+    rows = _measure_rows(measures)
+    if measures.window_s is None:
+        why, rows = "the run was too short", rows[: 1 if measures.warm_up_s is None else 2]
+    for name, value, unit in rows:
+        known = ("–", why) if value is None else (value.replace("-", "−"), unit)
+        table.add_row(name, *known)
     console.print(table)
 
 

@@ -82,10 +82,11 @@ class Conditions:
 class Score:
     """How one law did; the names are the keys of ``replay --json``.
 
-    `rms_error` is in the unit of the output, `r2` its share of the output's variance taken from 1,
-    `whiteness_p` the p value of `thermoctl.studies.whiteness.ljung_box`, NaN where `r2` is not
-    positive, `theta` and `theta_sd` are the last estimate and its
-    standard deviation in the units of the record, `us_per_sample` is the median time of an update.
+    `rms_error` is in the unit of the output; `r2` is the share of the output's variance that was
+    foreseen, negative when a constant would have done better; `whiteness_p` is the p value of
+    `thermoctl.studies.whiteness.ljung_box`, NaN unless `r2` is positive; `theta` and `theta_sd`
+    are the last estimate and its standard deviation in the units of the record; `us_per_sample` is
+    the median time of an update.
     """
 
     name: str
@@ -251,7 +252,7 @@ def _centre_and_scale(values: Array) -> tuple[float, float]:
 def _noise(scaled: _Scaled, conditions: Conditions) -> float:
     """Return the noise variance in the unit of the output squared.
 
-    The spread is 1.4826 times the median of the errors, which steps and outliers do not move; each
+    The spread is 1.4826 times the median of the errors, which a few outliers hardly move; each
     error is divided by what the uncertainty of the parameters adds to it. A quantised record that
     hardly moves has a median of zero: then the variance of one quantum stands in.
     """
@@ -316,7 +317,8 @@ def _score(
     e = trace.innovation[counted]
     y = scaled.y[counted] * conditions.y_scale
     spread = float(np.var(y)) if len(y) else math.nan
-    mean_square = float(np.mean(e**2)) if len(e) else math.nan
+    with np.errstate(over="ignore"):  # a law that ran away may have errors near 1e150
+        mean_square = float(np.mean(e**2)) if len(e) else math.nan
     r2 = 1.0 - mean_square / spread if spread > 0.0 else math.nan
     # One error that dwarfs all others looks white; whoever foresaw nothing gets no such praise.
     p = ljung_box(e / trace.innovation_sd[counted]).p if r2 > 0.0 else math.nan

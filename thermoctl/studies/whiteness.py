@@ -104,11 +104,9 @@ def chi_square_tail(x: float, degrees: int) -> float:
         raise ValueError(f"degrees must be at least 1, got {degrees!r}")
     if not x >= 0.0:  # written so that NaN fails too
         raise ValueError(f"x must not be negative, got {x!r}")
-    if x == 0.0:
-        return 1.0
-    if math.isinf(x):
-        return 0.0
     a, z = 0.5 * degrees, 0.5 * x
+    if z == 0.0 or math.isinf(z):
+        return 1.0 if z == 0.0 else 0.0
     front = math.exp(a * math.log(z) - z - math.lgamma(a))
     if z < a + 1.0:
         return max(0.0, 1.0 - front * _lower_series(a, z))
