@@ -27,8 +27,8 @@ class Disturbance:
         Amount when none is given, and its bounds.
     apply : callable
         Does it to a tank and returns a sentence that says what happened.
-    per_volume : bool
-        `default` and `high` are those of the 8 l rig and grow with the volume.
+    growth : float
+        `default` and `high` are those of the 8 l rig and grow with this power of the volume.
     """
 
     text: str
@@ -37,7 +37,7 @@ class Disturbance:
     low: float
     high: float
     apply: Callable[[Tank, float], str]
-    per_volume: bool = False
+    growth: float = 0.0
 
 
 def disturb(tank: Tank, name: str, amount: float | None = None) -> str:
@@ -60,7 +60,7 @@ def disturb(tank: Tank, name: str, amount: float | None = None) -> str:
     disturbance = DISTURBANCES.get(name)
     if disturbance is None:
         raise ValueError(f"disturbance must be one of {', '.join(DISTURBANCES)}, got {name!r}")
-    scale = tank.parameters.vessel.volume_l / REFERENCE_L if disturbance.per_volume else 1.0
+    scale = float((tank.parameters.vessel.volume_l / REFERENCE_L) ** disturbance.growth)
     quantity = disturbance.default * scale if amount is None else amount
     require(f"amount of {name}", quantity, disturbance.low, disturbance.high * scale)
     return disturbance.apply(tank, quantity)
@@ -120,9 +120,9 @@ def _rewiring(wiring: Wiring) -> Callable[[Tank, float], str]:
 
 
 DISTURBANCES: Mapping[str, Disturbance] = {
-    "cold-water": Disturbance("pour cold water", "l", 1.0, 0.0, 8.0, _pour, per_volume=True),
-    "ice": Disturbance("throw ice in", "kg", 0.3, 0.0, 4.0, _throw_ice, per_volume=True),
-    "bath-ice": Disturbance("refill the bath", "kg", 5.0, 0.0, 20.0, _refill_bath, per_volume=True),
+    "cold-water": Disturbance("pour cold water", "l", 1.0, 0.0, 8.0, _pour, growth=1.0),
+    "ice": Disturbance("throw ice in", "kg", 0.3, 0.0, 4.0, _throw_ice, growth=1.0),
+    "bath-ice": Disturbance("refill the bath", "kg", 5.0, 0.0, 20.0, _refill_bath, growth=2 / 3),
     "half-gone": Disturbance("lose water", "fraction", 0.5, 0.0, 0.9, _drain),
     "stirrer": Disturbance("stop or start the stirrer", "", 0.0, 0.0, 1.0, _toggle_stirrer),
     "sag": Disturbance("mains sag for a minute", "fraction", 0.15, 0.0, 1.0, _sag),

@@ -13,8 +13,8 @@ from thermoctl.plant.thermal import Heat
 
 LEAST_FILL = 0.1
 """Part of the nominal water that must stay in, or the heater would be dry."""
-SLUSH = 4.0
-"""Most ice a bath takes, as a multiple of the water in it; beyond, its cubes stand in air."""
+SLUSH = 20.0
+"""Most ice a bath takes, as a multiple of the water in it; beyond, hardly a cube is wet."""
 
 
 def pour(heat: Heat, vessel: Vessel, litres: float, temperature_c: float) -> Heat:

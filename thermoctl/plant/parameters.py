@@ -69,7 +69,7 @@ class Vessel:
     still_share: float = 0.20
     still_wall_share: float = 0.25
     exchange_w_per_k: float = 800.0
-    still_exchange_w_per_k: float = 40.0
+    still_exchange_w_per_k: float = 30.0
     inner_w_per_m2_k: float = 400.0
     still_inner_w_per_m2_k: float = 120.0
     glass_m: float = 0.004
