@@ -6,7 +6,7 @@ The only place that knows which class stands behind a port, and where boards are
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import serial
@@ -277,9 +277,9 @@ def _require_dead_man(name: str, board: BaseModel, settings: Settings) -> None:
         )
 
 
-def started_in(settings: Settings, mode: Mode) -> Settings:
-    """Return `settings` with every loop starting in `mode`."""
-    loops = {
-        name: table.model_copy(update={"mode": mode}) for name, table in settings.loops.items()
-    }
+def started_as(settings: Settings, starts: Mapping[str, tuple[Mode, float]]) -> Settings:
+    """Return `settings` with the given loops starting in another mode and at another set point."""
+    loops = dict(settings.loops)
+    for name, (mode, setpoint_c) in starts.items():
+        loops[name] = loops[name].model_copy(update={"mode": mode, "setpoint_c": setpoint_c})
     return settings.model_copy(update={"loops": loops})

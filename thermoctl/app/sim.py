@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ValidationError
 
-from thermoctl.app.compose import loop_for, started_in
+from thermoctl.app.compose import loop_for, started_as
 from thermoctl.app.settings import Settings, load
 from thermoctl.errors import ConfigError
 from thermoctl.runtime.clock import SimulatedClock
@@ -16,7 +16,9 @@ from thermoctl.signals import Cycle, Mode
 from thermoctl_drivers.simulated import SimulatedSettings
 
 
-def bench_settings(source: str | Path | Settings | None = None, seed: int | None = None) -> Settings:
+def bench_settings(
+    source: str | Path | Settings | None = None, seed: int | None = None
+) -> Settings:
     """Return settings whose boards are all simulated and whose loops start in auto.
 
     Parameters
@@ -36,7 +38,8 @@ def bench_settings(source: str | Path | Settings | None = None, seed: int | None
     boards = {name: _simulated(name, board, settings) for name, board in settings.boards.items()}
     if seed is not None:
         boards = {name: board.model_copy(update={"seed": seed}) for name, board in boards.items()}
-    return started_in(settings.model_copy(update={"boards": boards}), Mode.AUTO)
+    starts = {name: (Mode.AUTO, table.setpoint_c) for name, table in settings.loops.items()}
+    return started_as(settings.model_copy(update={"boards": boards}), starts)
 
 
 def default_profile() -> Path:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 import click
 from rich.console import Console
 
+from thermoctl.app.options import DURATION
 from thermoctl.app.settings import load
 from thermoctl.app.sim import profile, simulate
 from thermoctl.model.arx import Arx
@@ -34,8 +34,6 @@ from thermoctl.studies.replay_figure import draw_replay
 
 PLAIN_WIDTH = 120
 """Columns of a table that goes into a file or a pipe."""
-
-_UNITS_S = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
 class _Parsed(click.ParamType):  # type: ignore[type-arg]  # no parameter before click 8.2
@@ -70,14 +68,6 @@ def _positive(text: str) -> float:
     if not 0.0 < value < math.inf:
         raise ValueError(f"expected a number greater than zero, got {text!r}")
     return value
-
-
-def _seconds(text: str) -> float:
-    """Return a duration in s."""
-    match = re.fullmatch(r"\s*([0-9.]+)\s*([a-z]*)\s*", text)
-    if match is None or match[2] not in _UNITS_S:
-        raise ValueError(f"expected a duration such as 90s, 30m or 2h, got {text!r}")
-    return _positive(match[1]) * _UNITS_S[match[2]]
 
 
 @click.command("replay")
@@ -163,16 +153,18 @@ def _read(file: Path, wanted: Columns, loop: str | None) -> Record:
         if loop is not None:
             raise RecordError(f"{file}: expected a history of thermoctl for --loop, got other text")
         return read_csv(file, wanted)
+    except PermissionError:
+        raise
     except OSError as error:
         raise RecordError(f"{file}: expected a readable file, got: {error.strerror}") from error
 
 
 @click.group("reproduce")
-def reproduce_command() -> None:
+def reproduce() -> None:
     """Repeat published work with this program."""
 
 
-@reproduce_command.command("experiment")
+@reproduce.command("experiment")
 @click.option(
     "--tc",
     "reference_time_s",
@@ -185,7 +177,7 @@ def reproduce_command() -> None:
 @click.option(
     "--duration",
     "duration_s",
-    type=_Parsed("duration", _seconds),
+    type=DURATION,
     default="30m",
     show_default=True,
     help="Simulated time, such as 90s, 30m or 2h.",
@@ -236,6 +228,8 @@ def _draw(draw: Callable[[], Iterable[Path]]) -> None:
     """Draw, and say on stderr what was written."""
     try:
         _say(f"figure written to {path}" for path in draw())
+    except PermissionError:
+        raise
     except OSError as error:
         raise RecordError(
             f"{error.filename}: expected a file that can be written, got: {error.strerror}"

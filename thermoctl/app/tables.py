@@ -205,6 +205,10 @@ class HistoryTable(Table):
 class ServiceTable(Table):
     """Table ``[service]``: how the daemon behaves."""
 
+    state_directory: str | None = Field(
+        None, description="Folder of latches and history, when it is not the usual one."
+    )
+
     accept_no_dead_man: bool = Field(
         False, description="Run a board that cannot switch its output off by itself."
     )

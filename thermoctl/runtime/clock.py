@@ -6,6 +6,7 @@ Both satisfy `thermoctl.ports.Clock`, so an hour in a simulation runs the code a
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 _SLICE_S = 0.1  # how long a signal may have to wait for a sleep to end
 
@@ -59,21 +60,45 @@ class SimulatedClock:
 
 
 class PacedClock(SimulatedClock):
-    """Simulated time at a fixed ratio to real time: ``speed`` simulated seconds a second."""
+    """Simulated time at a fixed ratio to real time, with something to do while it waits.
+
+    Parameters
+    ----------
+    speed : float
+        Simulated seconds a second, greater than zero; infinite: never wait.
+    start_s : float
+        Simulated time at the start.
+    """
 
     def __init__(self, speed: float, start_s: float = 0.0) -> None:
-        if not 0.0 < speed < float("inf"):
-            raise ValueError(f"speed must be positive and finite, got {speed!r}")
+        if not speed > 0.0:
+            raise ValueError(f"speed must be positive, got {speed!r}")
         super().__init__(start_s)
         self._speed = speed
-        self._real = MonotonicClock()
-        self._anchor_s = self._real.now_s() - start_s / speed
+        self._anchor_s = time.monotonic() - start_s / speed
+        self._interrupted = False
+        self._paused = False
+        self.idle: Callable[[float], None] = time.sleep
+        """Called again and again while waiting, with the longest time it may take."""
 
     def sleep_until(self, t_s: float) -> None:
-        """Sleep as long as `t_s` takes at this speed; a late wake is made good, not repeated."""
-        self._real.sleep_until(self._anchor_s + t_s / self._speed)
+        """Wait as long as `t_s` takes at this speed; a late wake is made good, not repeated."""
+        while not self._interrupted:
+            begin_s = time.monotonic()
+            remaining_s = self._anchor_s + t_s / self._speed - begin_s
+            if self._paused:
+                self.idle(_SLICE_S)
+                self._anchor_s += time.monotonic() - begin_s
+            elif remaining_s > 0.0:
+                self.idle(min(remaining_s, _SLICE_S))
+            else:
+                break
         super().sleep_until(t_s)
+
+    def pause(self) -> None:
+        """Stop time where it is, or let it go on."""
+        self._paused = not self._paused
 
     def interrupt(self) -> None:
         """End this and every later sleep."""
-        self._real.interrupt()
+        self._interrupted = True

@@ -1,0 +1,208 @@
+"""``thermoctl --sim``: the bench test, as a live view or as JSON lines.
+
+Loop, view and keys share one thread: while the loop sleeps between two cycles, keys are read and
+the picture is drawn. So a disturbance never meets a tank in the middle of a step.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from thermoctl import __version__
+from thermoctl.app.compose import loop_for
+from thermoctl.app.live import Action, Desk, Facts, Keys, LiveModel, LiveScreen
+from thermoctl.app.live.desk import DISTURBANCES
+from thermoctl.app.report import Summary, as_line
+from thermoctl.app.settings import Settings
+from thermoctl.errors import Refused
+from thermoctl.ports import Simulated
+from thermoctl.runtime.clock import PacedClock
+from thermoctl.runtime.loop import Loop
+from thermoctl.services.history.schema import RunInfo
+from thermoctl.services.history.writer import HistoryWriter
+from thermoctl.services.places import make_private, state_dir
+from thermoctl.signals import Cycle, Event
+
+HISTORY = "sim.sqlite"
+_DRAW_S = 0.05
+_BACKLOG = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class BenchOptions:
+    """What the command line says of a bench test."""
+
+    speed: float
+    duration_s: float
+    as_json: bool
+    history: Path | None
+
+
+def run_bench(settings: Settings, options: BenchOptions) -> None:
+    """Run the bench test until its time is over, or somebody ends it."""
+    with ExitStack() as stack:
+        clock = PacedClock(options.speed)
+        sinks: list[Callable[[Cycle], None]] = []
+
+        def publish(cycle: Cycle) -> None:
+            for sink in sinks:
+                sink(cycle)
+
+        loop = loop_for(settings, clock, publish, beside=False)
+        stack.callback(loop.shut_down)
+        _end_on_signals(loop, clock)
+        if options.history is not None:
+            sinks.append(stack.enter_context(_recorded(settings, options.history)))
+        summary = Summary()
+        sinks.append(summary.add)
+        if options.as_json:
+            sinks.append(_json_lines(flush=math.isfinite(options.speed)))
+        else:
+            view = stack.enter_context(_LiveBench.on_terminal(settings, loop, clock, options))
+            sinks.append(view.take)
+            clock.idle = view.idle
+        loop.run(until_s=options.duration_s)
+    _tell(summary, options)
+
+
+def _end_on_signals(loop: Loop, clock: PacedClock) -> None:
+    def end(number: int, frame: object) -> None:
+        loop.stop()
+        clock.interrupt()
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, end)
+
+
+def _tell(summary: Summary, options: BenchOptions) -> None:
+    figures = summary.as_dict()
+    if options.as_json:
+        sys.stdout.write(json.dumps({"summary": figures}, allow_nan=False) + "\n")
+        sys.stdout.flush()
+        return
+    words = ", ".join(
+        f"{name} {'–' if value is None else value}" for name, value in figures.items()
+    )
+    click.echo(words, err=True)
+
+
+def _json_lines(*, flush: bool) -> Callable[[Cycle], None]:
+    write = sys.stdout.write
+
+    def sink(cycle: Cycle) -> None:
+        write(as_line(cycle) + "\n")
+        if flush:
+            sys.stdout.flush()
+
+    return sink
+
+
+@contextmanager
+def _recorded(settings: Settings, path: Path) -> Iterator[Callable[[Cycle], None]]:
+    """Record every cycle; a run faster than the disk waits for it instead of losing cycles."""
+    writer = HistoryWriter(path, RunInfo(__version__, settings.as_json()))
+    writer.start()
+    counted = 0
+
+    def sink(cycle: Cycle) -> None:
+        nonlocal counted
+        writer.publish(cycle)
+        counted += 1
+        if counted % (_BACKLOG // 4) == 0:
+            waited_until_s = time.monotonic() + 5.0
+            while (
+                writer.health().counters["waiting"] > _BACKLOG and time.monotonic() < waited_until_s
+            ):
+                time.sleep(0.01)
+
+    try:
+        yield sink
+    finally:
+        if not writer.close(timeout_s=10.0):
+            click.echo(f"thermoctl: not every cycle reached {path}", err=True)
+
+
+def history_path(state: Path | None) -> Path | None:
+    """Return where a bench test is recorded; None, with a word on stderr, where it cannot be."""
+    try:
+        return make_private(state or state_dir()) / HISTORY
+    except Exception as error:  # noqa: BLE001 - a bench test without its record is still one
+        click.echo(f"thermoctl: no history is kept: {error}", err=True)
+        return None
+
+
+class _LiveBench:
+    """The live view of a bench test: takes cycles, draws when the loop is idle, obeys keys."""
+
+    def __init__(
+        self, loop: Loop, clock: PacedClock, model: LiveModel, screen: LiveScreen, keys: Keys
+    ) -> None:
+        self._loop, self._clock = loop, clock
+        self._model, self._screen, self._keys = model, screen, keys
+        self._desk = Desk(model.facts)
+        self._last: Cycle | None = None
+        self._drawn_s = 0.0
+
+    @staticmethod
+    @contextmanager
+    def on_terminal(
+        settings: Settings, loop: Loop, clock: PacedClock, options: BenchOptions
+    ) -> Iterator[_LiveBench]:
+        """Take the terminal over, and give it back whatever happens."""
+        name, table = settings.loop()
+        low_c, high_c = table.setpoint_range_c
+        speed = options.speed if math.isfinite(options.speed) else None
+        facts = Facts(
+            name, table.period_s, low_c, high_c, datetime.now(UTC).astimezone(), speed=speed
+        )
+        model = LiveModel(facts)
+        with Keys(sys.stdin.fileno()) as keys, LiveScreen(model) as screen:
+            yield _LiveBench(loop, clock, model, screen, keys)
+
+    def take(self, cycle: Cycle) -> None:
+        """Feed the view; at full speed this is also where it gets a turn."""
+        self._model.feed(cycle)
+        self._last = cycle
+        if time.monotonic() - self._drawn_s > _DRAW_S:
+            self.idle(0.0)
+
+    def idle(self, timeout_s: float) -> None:
+        """Spend up to `timeout_s` on keys, then draw if it is time to."""
+        for action in self._keys.poll(min(timeout_s, _DRAW_S)):
+            self._obey(action)
+        self._screen.draw(self._clock.now_s(), self._desk.prompt)
+        self._drawn_s = time.monotonic()
+
+    def _obey(self, action: Action) -> None:
+        if action is Action.QUIT:
+            self._loop.stop()
+            self._clock.interrupt()
+        elif action is Action.PAUSE:
+            self._clock.pause()
+        elif action in DISTURBANCES:
+            self._disturb(action)
+        elif self._last is not None:
+            step = self._last.step
+            request = self._desk.press(action, step.mode, step.setpoint_c)
+            if request is not None:
+                self._loop.ask(request, self._last.loop)
+
+    def _disturb(self, action: Action) -> None:
+        for board in self._loop.boards:
+            if isinstance(board.board, Simulated):
+                try:
+                    what = board.board.disturb(action.value)
+                except Refused as refusal:
+                    what = str(refusal)
+                self._model.note(Event(self._clock.now_s(), "sim.disturbed", {"text": what}))

@@ -1,0 +1,261 @@
+"""``thermoctl run``: the daemon.
+
+The control loop has a thread of its own and shares no lock with anything that does I/O. The main
+thread waits for signals, and stores what must survive a restart.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import signal
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from thermoctl import __version__
+from thermoctl.app.compose import loop_for, started_as
+from thermoctl.app.settings import Settings, default_files, load_all
+from thermoctl.errors import ConfigError, ThermoctlError
+from thermoctl.runtime.clock import MonotonicClock
+from thermoctl.services.history.schema import RunInfo
+from thermoctl.services.history.writer import HistoryWriter
+from thermoctl.services.journal import Journal, sink_for
+from thermoctl.services.latches import LatchKeeper
+from thermoctl.services.lock import DaemonLock, device_lock_path
+from thermoctl.services.notify import Notifier
+from thermoctl.services.places import make_private, runtime_dir, state_dir
+from thermoctl.services.store import LatchStore, RunRecord, RunStore
+from thermoctl.signals import Acknowledge, Alarm, Cycle, Event, Mode, SetPoint
+
+SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+_TURN_S = 0.2
+_STOP_S = 1.5
+_STATUS_EVERY = 10
+
+
+def state_for(settings: Settings, given: Path | None) -> Path:
+    """Return the state folder: the option, the configuration's, or the usual one."""
+    configured = settings.service.state_directory
+    return given or (Path(configured) if configured else state_dir())
+
+
+@dataclass(slots=True)
+class _Seen:
+    """The last cycle of every loop, written by the loop's thread and read by the main one."""
+
+    cycles: dict[str, Cycle] = field(default_factory=dict)
+
+
+class Daemon:
+    """One run of the daemon.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Configuration files; the machine's when empty.
+    state : Path, optional
+        State folder from the command line.
+
+    Raises
+    ------
+    ConfigError
+        The configuration is bad; nothing has been switched on.
+    Unavailable
+        Another daemon holds the state folder or a device.
+    """
+
+    def __init__(self, files: Sequence[Path], state: Path | None = None) -> None:
+        self._files = list(files) or default_files()
+        settings = load_all(self._files)
+        self._settings = settings
+        directory = make_private(state_for(settings, state))
+        run_directory = make_private(runtime_dir())
+        self._locks = [DaemonLock(directory / "daemon.lock")]
+        self._locks += [
+            DaemonLock(device_lock_path(run_directory, board.port))
+            for board in settings.boards.values()
+            if hasattr(board, "port")
+        ]
+        self._journal = Journal(sink_for())
+        self._notifier = Notifier()
+        self._latches = LatchStore(directory, run_directory)
+        self._runs = RunStore(directory)
+        self._stored: dict[str, RunRecord] = {}
+        self._seen = _Seen()
+        self._clock = MonotonicClock()
+        self._loop = loop_for(
+            self._resumed(settings),
+            self._clock,
+            self._publish,
+            latched=self._latched(settings),
+            completed=self._completed,
+        )
+        self._keeper = LatchKeeper(self._latches, self._acknowledged_on_disk)
+        self._history: HistoryWriter | None = None
+        if settings.history.enabled:
+            self._history = HistoryWriter(
+                directory / settings.history.file,
+                RunInfo(__version__, settings.as_json()),
+                report=self._journal.emit,
+            )
+        self._confirmed = False
+        self._ready = False
+
+    # -- starting where the last run ended -------------------------------------------------------
+
+    def _resumed(self, settings: Settings) -> Settings:
+        """Return `settings` with the modes and set points this start begins with."""
+        starts: dict[str, tuple[Mode, float]] = {}
+        for name, table in settings.loops.items():
+            record, warning = self._runs.load(name)
+            if warning is not None:
+                self._emit("state.ignored", name, why=warning)
+            if record is None:
+                continue
+            if not table.resume:
+                starts[name] = (Mode.OFF, table.setpoint_c)
+                self._emit("loop.not_resumed", name, was=record.mode.value)
+            else:
+                low_c, high_c = table.setpoint_range_c
+                within = low_c <= record.setpoint_c <= high_c
+                starts[name] = (record.mode, record.setpoint_c if within else table.setpoint_c)
+        return started_as(settings, starts)
+
+    def _latched(self, settings: Settings) -> dict[str, Alarm]:
+        found = {}
+        for name in settings.loops:
+            latch = self._latches.load(name)
+            if latch is not None:
+                found[name] = Alarm(latch.code, latch.fault, 1, 0.0, latch.text, latched=True)
+                self._emit("latch.kept", name, code=latch.code, text=latch.text)
+        return found
+
+    # -- running ---------------------------------------------------------------------------------
+
+    def run(self) -> bool:
+        """Run until a signal ends it; return whether power 0 was confirmed by every board."""
+        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # before any thread inherits the mask
+        with contextlib.ExitStack() as stack:
+            for lock in self._locks:
+                stack.enter_context(lock)
+            self._journal.start()
+            stack.callback(self._journal.close)
+            self._keeper.start()
+            stack.callback(self._keeper.close)
+            if self._history is not None:
+                self._history.start()
+                stack.callback(self._history.close)
+            self._emit("loop.started", None, loops=list(self._settings.loops), version=__version__)
+            gc.freeze()  # what is loaded now stays: no collection needs to look at it again
+            control = threading.Thread(target=self._control, name="control", daemon=True)
+            control.start()
+            self._attend(control)
+            self._emit("loop.stopped", None, power_0_confirmed=self._confirmed)
+        return self._confirmed
+
+    def _control(self) -> None:
+        try:
+            self._loop.run()
+        finally:
+            self._confirmed = self._loop.shut_down()
+
+    def _attend(self, control: threading.Thread) -> None:
+        """Wait for signals until the control thread has ended."""
+        while control.is_alive():
+            received = signal.sigtimedwait(SIGNALS, _TURN_S)
+            if received is not None and received.si_signo == signal.SIGHUP:
+                self._reload()
+            elif received is not None:
+                self._notifier.stopping()
+                self._loop.stop()
+                self._clock.interrupt()
+                control.join(_STOP_S)
+                break
+            self._store_runs()
+        self._store_runs()
+
+    def _store_runs(self) -> None:
+        for name, cycle in list(self._seen.cycles.items()):
+            record = RunRecord(cycle.step.mode, cycle.step.setpoint_c)
+            if self._stored.get(name) != record:
+                with contextlib.suppress(
+                    OSError
+                ):  # a full or read-only disk: tried again next turn
+                    self._runs.save(name, record)
+                    self._stored[name] = record
+
+    # -- called by the loop's thread ---------------------------------------------------------------
+
+    def _publish(self, cycle: Cycle) -> None:
+        self._seen.cycles[cycle.loop] = cycle
+        for event in cycle.step.events:
+            self._journal.emit(event, cycle.loop)
+        latched = next((alarm for alarm in cycle.step.alarms if alarm.latched), None)
+        if latched is None:
+            self._keeper.cleared(cycle.loop)
+        else:
+            self._keeper.latched(cycle.loop, latched)
+        if self._history is not None:
+            self._history.publish(cycle)
+
+    def _completed(self) -> None:
+        """Tell the service manager: ready after the first cycle, alive after every one."""
+        if not self._ready:
+            self._ready = True
+            self._notifier.ready()
+        self._notifier.watchdog()
+        if self._loop.cycles % _STATUS_EVERY == 1:
+            self._notifier.status(", ".join(_words(each) for each in self._seen.cycles.values()))
+
+    def _acknowledged_on_disk(self, loop: str) -> None:
+        self._loop.ask(Acknowledge(), loop)
+
+    # -- the configuration again -------------------------------------------------------------------
+
+    def _reload(self) -> None:
+        """Read the files again: all or nothing, and never a limit that a restart should set."""
+        self._notifier.reloading()
+        try:
+            fresh = load_all(self._files)
+            changed = _changed_keys(self._settings, fresh)
+            beyond = [key for key in changed if not key.endswith(".setpoint_c")]
+            if beyond:
+                raise ConfigError(f"a restart is needed to change {', '.join(beyond)}")
+        except ThermoctlError as error:
+            self._emit("config.refused", None, why=str(error))
+        else:
+            for key in changed:
+                name = key.split(".")[1]
+                self._loop.ask(SetPoint(fresh.loops[name].setpoint_c), name)
+            self._settings = fresh
+            self._emit("config.loaded", None, changed=changed)
+        self._notifier.ready()
+
+    def _emit(self, name: str, loop: str | None, **fields: object) -> None:
+        self._journal.emit(Event(self._clock.now_s(), name, fields), loop)
+
+
+def _words(cycle: Cycle) -> str:
+    step = cycle.step
+    return (
+        f"{cycle.loop} {step.measurement.temperature_c:.2f} °C, set {step.setpoint_c:.2f} °C, "
+        f"power {100.0 * step.command.power:.1f} %, {step.mode} {step.state}"
+    )
+
+
+def _changed_keys(before: Settings, after: Settings) -> list[str]:
+    """Return the dotted keys whose values differ."""
+    old, new = _flat(before.model_dump(mode="json")), _flat(after.model_dump(mode="json"))
+    return sorted(key for key in old.keys() | new.keys() if old.get(key) != new.get(key))
+
+
+def _flat(tree: dict[str, object], prefix: str = "") -> dict[str, object]:
+    flat: dict[str, object] = {}
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            flat |= _flat(value, f"{prefix}{key}.")
+        else:
+            flat[f"{prefix}{key}"] = value
+    return flat

@@ -1,0 +1,78 @@
+"""Option types and words that several commands share."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+_UNITS_S = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Duration(click.ParamType):  # type: ignore[type-arg]  # no parameter before click 8.2
+    """A duration in s, written ``90``, ``90s``, ``10m``, ``1h`` or ``2d``."""
+
+    name = "duration"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):
+            return value
+        match = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*([a-z]*)\s*", value)
+        if match is None or match[2] not in _UNITS_S or not float(match[1]) > 0.0:
+            self.fail(f"expected a duration such as 90s, 10m or 1h, got {value!r}", param, ctx)
+        return float(match[1]) * _UNITS_S[match[2]]
+
+
+class Speed(click.ParamType):  # type: ignore[type-arg]
+    """Simulated seconds a second: a positive number, or ``max`` for infinite."""
+
+    name = "speed"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if value == "max":
+            return math.inf
+        try:
+            speed = float(value)
+        except ValueError:
+            speed = math.nan
+        if not 0.0 < speed <= 1e6:
+            self.fail(f"expected a positive number or max, got {value!r}", param, ctx)
+        return speed
+
+
+DURATION, SPEED = Duration(), Speed()
+
+
+def config_option(function: F) -> F:
+    """Add ``-c FILE``, which may be given several times."""
+    return click.option(
+        "-c",
+        "--config",
+        "configs",
+        multiple=True,
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        help="Configuration; /etc/thermoctl/*.toml when not given.",
+    )(function)
+
+
+def state_option(function: F) -> F:
+    """Add ``--state DIR``."""
+    return click.option(
+        "--state",
+        type=click.Path(path_type=Path, file_okay=False),
+        metavar="DIR",
+        help="Folder of what survives a restart; else $STATE_DIRECTORY, else the user's.",
+    )(function)
+
+
+def json_option(function: F) -> F:
+    """Add ``--json``."""
+    return click.option("--json", "as_json", is_flag=True, help="Machine-readable output.")(
+        function
+    )

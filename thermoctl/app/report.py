@@ -1,0 +1,138 @@
+"""A cycle as one line of JSON, and a run as one summary."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from typing import Any
+
+from thermoctl.signals import Cycle, Estimate
+
+SETTLED_K = 0.1
+SETTLED_FOR_S = 60.0
+
+
+def finite(value: float | None) -> float | None:
+    """Return `value`, None where it is not known; no NaN ever leaves the program."""
+    return None if value is None or not math.isfinite(value) else value
+
+
+def as_line(cycle: Cycle) -> str:
+    """Return the cycle as one JSON object; the keys are words with units."""
+    return json.dumps(cycle_record(cycle), allow_nan=False)
+
+
+def cycle_record(cycle: Cycle) -> dict[str, Any]:
+    """Return what is told of a cycle, None for what is not known."""
+    step, beliefs, estimate = cycle.step, cycle.step.beliefs, cycle.step.estimate
+    return {
+        "t_s": round(step.t_s, 6),
+        "loop": cycle.loop,
+        "mode": step.mode.value,
+        "state": step.state.value,
+        "temperature_c": finite(step.measurement.temperature_c),
+        "quality": step.measurement.quality.value,
+        "setpoint_c": step.setpoint_c,
+        "power": step.command.power,
+        "accepted_power": finite(cycle.accepted_power),
+        "controller": step.controller,
+        "innovation_k": finite(_innovation(estimate)),
+        "inflation": finite(estimate.inflation),
+        "gain": finite(beliefs.gain),
+        "gain_sd": finite(beliefs.gain_sd),
+        "a": finite(beliefs.a),
+        "a_sd": finite(beliefs.a_sd),
+        "tick_us": round(cycle.tick_us, 1),
+        "late_s": round(cycle.late_s, 6),
+        "alarms": [alarm.code for alarm in step.alarms],
+        **{name: value for name, value in cycle.truth.items() if name == "true_temperature_c"},
+    }
+
+
+def _innovation(estimate: Estimate) -> float:
+    return math.nan if estimate.rejected else estimate.innovation
+
+
+class Summary:
+    """Figures of one loop's run, gathered as it goes; memory does not grow with the run.
+
+    Judged on the true temperature where a simulation knows it. Settled is the first moment from
+    which the temperature stays within 0.1 K of the set point for a minute; deviations count from
+    there on, and a new set point begins anew.
+    """
+
+    def __init__(self) -> None:
+        self._wall_s = time.monotonic()
+        self._first: Cycle | None = None
+        self._last: Cycle | None = None
+        self._steps = 0
+        self._temperature_c = math.nan
+        self._travel = 0.0
+        self._power: float | None = None
+        self._begin("", 0.0)
+
+    def _begin(self, loop: str, t_s: float) -> None:
+        self._start_s = t_s
+        self._rising: bool | None = None
+        self._overshoot_k = 0.0
+        self._within_since_s: float | None = None
+        self._settled_s: float | None = None
+        self._squares = self._largest_k = 0.0
+        self._counted = 0
+
+    def add(self, cycle: Cycle) -> None:
+        """Take one finished cycle; only those of the first loop count."""
+        step = cycle.step
+        if self._first is None:
+            self._first = cycle
+        elif cycle.loop != self._first.loop:
+            return
+        if self._last is None or step.setpoint_c != self._last.step.setpoint_c:
+            self._begin(cycle.loop, step.t_s)
+        self._last = cycle
+        self._steps += 1
+        if math.isfinite(cycle.accepted_power):
+            if self._power is not None:
+                self._travel += abs(cycle.accepted_power - self._power)
+            self._power = cycle.accepted_power
+        temperature_c = cycle.truth.get("true_temperature_c", step.measurement.temperature_c)
+        if math.isfinite(temperature_c):
+            self._temperature_c = temperature_c
+            self._judge(temperature_c - step.setpoint_c, step.t_s)
+
+    def _judge(self, deviation_k: float, t_s: float) -> None:
+        if self._rising is None:
+            self._rising = deviation_k < 0.0
+        self._overshoot_k = max(self._overshoot_k, deviation_k if self._rising else -deviation_k)
+        if self._settled_s is None:
+            if abs(deviation_k) > SETTLED_K:
+                self._within_since_s = None
+            elif self._within_since_s is None:
+                self._within_since_s = t_s
+            elif t_s - self._within_since_s >= SETTLED_FOR_S:
+                self._settled_s = self._within_since_s - self._start_s
+            return
+        self._squares += deviation_k**2
+        self._largest_k = max(self._largest_k, abs(deviation_k))
+        self._counted += 1
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures; None for what has not happened."""
+        first, last = self._first, self._last
+        duration_s = last.step.t_s - first.step.t_s if first and last else 0.0
+        settled = self._counted > 0
+        return {
+            "duration_s": round(duration_s, 3),
+            "steps": self._steps,
+            "missed": last.missed if last else 0,
+            "overshoot_k": round(self._overshoot_k, 4),
+            "settled_s": self._settled_s,
+            "deviation_mk": round(1e3 * math.sqrt(self._squares / self._counted), 2)
+            if settled
+            else None,
+            "max_deviation_mk": round(1e3 * self._largest_k, 2) if settled else None,
+            "travel_per_min": round(60.0 * self._travel / duration_s, 3) if duration_s else None,
+            "final_temperature_c": finite(self._temperature_c),
+            "wall_s": round(time.monotonic() - self._wall_s, 3),
+        }
