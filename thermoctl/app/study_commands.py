@@ -136,13 +136,13 @@ def replay_command(
         require_matplotlib()
     record = _read(file, Columns(output_column, input_column, time_column), loop)
     result = replay(record, order, laws, R2=noise, P0=start_variance, keep_mean=keep_mean)
-    if as_json:
-        _print_json(replay_json(result))
-        _say(record.notes)
-    else:
-        print_replay(_console(), result)
     if plot:
         _draw(lambda: draw_replay(result, list(plot)))
+    if as_json:
+        _say(record.notes)
+        _print_json(replay_json(result))
+    else:
+        print_replay(_console(), result)
 
 
 def _read(file: Path, wanted: Columns, loop: str | None) -> Record:
@@ -198,19 +198,19 @@ def experiment_command(
     Draws counterparts of its Figures 20 to 22: output, input and the estimate of a(t).
     """
     require_matplotlib()
-    run = _simulated(reference_time_s, duration_s, seed)
-    measures = measure(run)
     title, stem = "The law of O21, equation (27), as printed", "experiment"
     if reference_time_s is not None:
         title = f"The law of O21, approaching the set point with {reference_time_s:g} s"
         stem = f"experiment-tc{reference_time_s:g}"
     files = [out / f"{stem}{kind}" for kind in FORMATS]
+    run = _simulated(reference_time_s, duration_s, seed)
+    measures = measure(run)
+    _draw(lambda: draw_experiment(run, measures, title, files))
     if as_json:
         conditions = {"tc_s": reference_time_s, "seed": seed, "duration_s": duration_s}
         _print_json(experiment_json(measures, conditions, files))
     else:
         print_experiment(_console(), title, measures)
-    _draw(lambda: draw_experiment(run, measures, title, files))
 
 
 def _simulated(reference_time_s: float | None, duration_s: float, seed: int) -> Run:
@@ -232,7 +232,7 @@ def _draw(draw: Callable[[], Iterable[Path]]) -> None:
         raise
     except OSError as error:
         raise RecordError(
-            f"{error.filename}: expected a file that can be written, got: {error.strerror}"
+            f"{error.filename}: expected a place for a figure, got: {error.strerror}"
         ) from error
 
 

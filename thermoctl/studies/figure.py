@@ -105,7 +105,9 @@ def styled(
 
 
 def save(figure: Any, path: Path) -> Path:
-    """Write `figure` to `path`; its suffix, .png or .svg, decides the format. Call inside `styled`.
+    """Write `figure` to `path`; its suffix, .png or .svg, decides the format.
+
+    The folder is made when it is not there. Call inside `styled`, whose style reaches the file too.
 
     Raises
     ------
@@ -117,6 +119,7 @@ def save(figure: Any, path: Path) -> Path:
     kind = path.suffix.lower()
     if kind not in FORMATS:
         raise ValueError(f"expected a figure file ending in .png or .svg, got {path.name!r}")
+    path.parent.mkdir(parents=True, exist_ok=True)
     # Without a date in it, the same run gives the same file.
     metadata = {"Date": None} if kind == ".svg" else {"Software": None}
     figure.savefig(path, format=kind[1:], metadata=metadata)

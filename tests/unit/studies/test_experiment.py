@@ -44,7 +44,7 @@ def run_with(true_c, power=None, setpoint_c=37.5, measured_c=None):
 def warmed(after, start_c=25.0, rise_s=500.0):
     """A straight warm-up over `rise_s`, then 37.5 degC plus `after`, in K."""
     ramp = np.minimum(start_c + (37.5 - start_c) * T_S / rise_s, 37.5)
-    return np.where(T_S < rise_s, ramp, 37.5 + after)
+    return np.where(ramp < 37.5, ramp, 37.5 + after)
 
 
 def test_bias_and_deviation_are_those_of_the_true_temperature():

@@ -71,7 +71,7 @@ def test_a_few_outliers_hardly_move_the_estimated_noise():
     y[300::400] += 5.0
     spoilt = Record("made", clean.t_s, clean.u, y, clean.names)
     R2 = [replay(record, ORDER, [KALMAN]).conditions.R2 for record in (clean, spoilt)]
-    assert R2[1] < 1.5 * R2[0]
+    assert R2[1] < 2.0 * R2[0]  # the mean square of the same errors grows a hundredfold
 
 
 def test_a_given_noise_is_used_and_said():
