@@ -9,7 +9,7 @@ from __future__ import annotations
 import sqlite3
 import time
 from collections.abc import Callable, Iterable
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import Final
 
 from thermoctl.services.history.schema import (
     APPLICATION_ID,
+    FIND_RUN,
     INSERT_CYCLE,
     INSERT_RUN,
     SCHEMA,
@@ -32,6 +33,9 @@ DAMAGED: Final = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
 """Primary result codes that no retry will cure."""
 
 COMPANIONS: Final = ("-wal", "-shm")
+
+LOOK_AGAIN: Final = 60
+"""Commits between two looks at the file with fresh eyes; one takes about a millisecond."""
 
 FORGET_AT_ONCE: Final = 5000
 """Rows deleted per commit at most, so that a lowered limit does not make one commit endless."""
@@ -105,10 +109,11 @@ class HistoryFile:
         self._run_id: int | None = None
         self._started_utc_s = run.started_utc_s
         self._condemned = ""
+        self._size = self._looks = 0
 
     def ensure_open(self) -> Opened:
         """Open the file unless it is; `Opened.set_aside` is only told once."""
-        if self._opened is not None and self._is_still_ours():
+        if self._opened is not None and self._is_still_ours() and self._looks_whole():
             self._opened = Opened(self._opened.connection)
             return self._opened
         self.close()
@@ -118,10 +123,8 @@ class HistoryFile:
             condemned=self._condemned,
             wall_clock=self._wall_clock,
         )
-        self._condemned = ""
-        if not self._is_still_ours():
-            self._inode, self._run_id = self._path.stat().st_ino, None
-        self._opened = opened
+        self._condemned, self._run_id = "", None
+        self._opened, self._inode, self._size, self._looks = opened, self._path.stat().st_ino, 0, 0
         return opened
 
     def append(self, rows: Iterable[Row]) -> int:
@@ -160,10 +163,26 @@ class HistoryFile:
         except FileNotFoundError:
             return False
 
+    def _looks_whole(self) -> bool:
+        """Condemn a file that was damaged under an open connection.
+
+        SQLite would go on writing into its log for hours, and nobody could read a row of it.
+        """
+        size, before = self._path.stat().st_size, self._size
+        self._size = size
+        if size < before:  # it never shrinks by itself: nothing here vacuums
+            self._condemned = f"it has shrunk from {before} to {size} bytes"
+        self._looks += 1
+        if self._looks % LOOK_AGAIN == 0:
+            self._condemned = self._condemned or _seen_anew(self._path)
+        return not self._condemned
+
     def _begin_run(self, connection: sqlite3.Connection) -> int:
         if self._started_utc_s is None:
             self._started_utc_s = self._wall_clock()
         begun = (self._started_utc_s, self._run.version, self._run.configuration)
+        if known := connection.execute(FIND_RUN, begun).fetchone():
+            return int(known[0])  # the same start, and the file was only opened again
         run_id = connection.execute(INSERT_RUN, begun).lastrowid
         assert run_id is not None  # an INSERT always has one; for the type checker
         return run_id
@@ -200,6 +219,21 @@ def _unusable(connection: sqlite3.Connection, check: bool) -> str:
             return str(error)
         connection.close()
         raise
+    return ""
+
+
+def _seen_anew(path: Path) -> str:
+    """Read a little through a connection without cached pages; return what is wrong, or ''.
+
+    Only SQLite may open the file here: closing any other descriptor of it would drop the locks
+    that this process holds on it.
+    """
+    try:
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as anew:
+            for end in ("min", "max"):  # one at a time: only so does SQLite not read every row
+                anew.execute(f"SELECT {end}(id), loop FROM cycles").fetchone()
+    except sqlite3.Error as error:
+        return str(error) if _is_damage(error) else ""
     return ""
 
 

@@ -128,6 +128,10 @@ PRAGMA user_version = {SCHEMA_VERSION};
 """
 
 INSERT_RUN: Final = "INSERT INTO runs (started_utc_s, version, configuration) VALUES (?, ?, ?)"
+FIND_RUN: Final = (
+    "SELECT id FROM runs WHERE started_utc_s = ? AND version = ? AND configuration = ? "
+    "ORDER BY id DESC LIMIT 1"
+)
 INSERT_CYCLE: Final = (
     f"INSERT INTO cycles (run, wall_utc_s, {', '.join(column.name for column in COLUMNS)}) "
     f"VALUES (?, ?, {', '.join('?' * len(COLUMNS))})"

@@ -12,7 +12,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -104,7 +103,9 @@ class HistoryWriter:
         The thread is a daemon thread: a disk that hangs does not keep the process alive.
         """
         self._closing.set()
-        if self._thread.is_alive():
+        if self._thread.ident is None:  # never started, so this thread is the only one
+            self._finish()
+        elif self._thread.is_alive():
             self._thread.join(timeout_s)
         return not (self._thread.is_alive() or self._feed or self._waiting)
 
@@ -152,9 +153,11 @@ class HistoryWriter:
     def _run(self) -> None:
         while not self._closing.wait(self._commit_every_s):
             self.store_waiting()
+        self._finish()
+
+    def _finish(self) -> None:
         self.store_waiting()
-        with suppress(sqlite3.Error):
-            self._file.close()
+        self._file.close()
 
     def _drain(self) -> None:
         """Turn what the loop published into rows."""
