@@ -7,6 +7,7 @@ with phase angle chosen it does what the firmware does with that input open, who
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ CONVERSIONS_PER_PERIOD = 32
 
 _BYTE_US = 87
 _NEVER_US = 1 << 62
+_RING = 127
 _REFERENCE_MV = 5000.0
 _ARGUMENTS_MAX = 5
 _PHASE_LEAST = frames.FULL_POWER // 100
@@ -81,7 +83,7 @@ class Output:
         if power == 0:
             self.level, self._sum = False, 0
         self.power, self.cut = power, Cut.NONE
-        self.expires_us = now_us + 1000 * min(valid_ms, self._chosen.dead_man_ms)
+        self.expires_us = now_us + 1000 * valid_ms
         return power
 
     def expire(self) -> None:
@@ -282,19 +284,19 @@ class BoardModel:
             self._reply(sequence, "E", refused.reason)
 
     def _obey(self, sequence: str, letter: str, arguments: tuple[int, ...]) -> None:
-        wanted = {"H": 0, "C": 5, "R": 0, "W": 2, "U": 1}
-        if letter not in wanted:
-            raise _RefusedError(Refusal.COMMAND)
-        if len(arguments) != wanted[letter]:
-            raise _RefusedError(Refusal.ARGUMENTS)
-        obey = {
-            "H": self._hello,
-            "C": self._configure,
-            "R": self._read,
-            "W": self._write,
-            "U": self._set_unit,
+        commands: dict[str, tuple[int, Callable[..., tuple[object, ...]]]] = {
+            "H": (0, self._hello),
+            "C": (5, self._configure),
+            "R": (0, self._read),
+            "W": (2, self._write),
+            "U": (1, self._set_unit),
         }
-        self._reply(sequence, letter, *obey[letter](*arguments))
+        if letter not in commands:
+            raise _RefusedError(Refusal.COMMAND)
+        count, obey = commands[letter]
+        if len(arguments) != count:
+            raise _RefusedError(Refusal.ARGUMENTS)
+        self._reply(sequence, letter, *obey(*arguments))
 
     def _hello(self) -> tuple[object, ...]:
         flags = self._flags()
@@ -322,6 +324,7 @@ class BoardModel:
             raise _RefusedError(Refusal.RANGE)
         if power and not self._configured:
             raise _RefusedError(Refusal.UNCONFIGURED)
+        valid_ms = min(valid_ms, self._chosen.dead_man_ms)
         taken = self._output.command(power, valid_ms, self._now_us)
         return (taken, valid_ms, f"{self._flags():02X}")
 
@@ -348,9 +351,12 @@ class BoardModel:
     def _reply(self, sequence: str, letter: str, *fields: object) -> None:
         words = [sequence, letter]
         words += [str(int(each)) if isinstance(each, int) else str(each) for each in fields]
+        line = frames.frame(b"<", " ".join(words).encode("ascii"))
+        if len(self._outgoing) + len(line) > _RING:
+            return  # no room: lost, never waited for
         if not self._outgoing:
             self._next_out_us = self._now_us + _BYTE_US
-        self._outgoing += frames.frame(b"<", " ".join(words).encode("ascii"))
+        self._outgoing += line
 
 
 def _body(line: bytes) -> bytes:

@@ -102,17 +102,17 @@ class Chip:
     @property
     def t_s(self) -> float:
         """Time since power-on in s, to a cycle."""
-        return self._calls.thermodaq_sim_cycle(self._board) / FREQUENCY_HZ
+        return float(self._calls.thermodaq_sim_cycle(self._board)) / FREQUENCY_HZ
 
     @property
     def on_s(self) -> float:
         """How long the heater pin has been high, in all, in s."""
-        return self._calls.thermodaq_sim_on_cycles(self._board) / FREQUENCY_HZ
+        return float(self._calls.thermodaq_sim_on_cycles(self._board)) / FREQUENCY_HZ
 
     @property
     def off_since_s(self) -> float:
         """When the heater pin went low the last time, in s."""
-        return self._calls.thermodaq_sim_off_since(self._board) / FREQUENCY_HZ
+        return float(self._calls.thermodaq_sim_off_since(self._board)) / FREQUENCY_HZ
 
     @property
     def edges(self) -> int:

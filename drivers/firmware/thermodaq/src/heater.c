@@ -119,12 +119,12 @@ void heater_configure(const struct configuration *chosen, enum cut_reason reason
     }
 }
 
-uint16_t heater_set(uint16_t wanted, uint16_t valid_ms)
+uint16_t heater_set(uint16_t wanted, uint16_t *valid_ms)
 {
     if (wanted > setup.power_max)
         wanted = setup.power_max;
-    if (valid_ms > setup.dead_man_ms)
-        valid_ms = setup.dead_man_ms;
+    if (*valid_ms > setup.dead_man_ms)
+        *valid_ms = setup.dead_man_ms;
     if (setup.mode == MODE_PHASE_ANGLE && wanted < PHASE_LEAST)
         wanted = 0;
     uint16_t delay = delay_for(wanted);
@@ -134,7 +134,7 @@ uint16_t heater_set(uint16_t wanted, uint16_t valid_ms)
             off(); /* at once, even within a cycle */
         power = wanted;
         fire_delay = delay;
-        left_ms = valid_ms;
+        left_ms = *valid_ms;
         cut = CUT_NONE;
     }
     return wanted;

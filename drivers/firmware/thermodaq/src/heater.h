@@ -10,8 +10,8 @@
 /* Output off and the chosen mode in force; the reason is reported until the next command. */
 void heater_configure(const struct configuration *chosen, enum cut_reason reason);
 
-/* Take `power` (limited to the cap) for at most `valid_ms`; return what was taken. */
-uint16_t heater_set(uint16_t power, uint16_t valid_ms);
+/* Take `power` (limited to the cap) for `valid_ms` (limited to the dead-man); return the power. */
+uint16_t heater_set(uint16_t power, uint16_t *valid_ms);
 
 uint16_t heater_power(void);
 enum cut_reason heater_cut(void);

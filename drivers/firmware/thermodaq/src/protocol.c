@@ -135,7 +135,7 @@ static enum refusal write(const struct request *asked)
         return REFUSED_RANGE;
     if (power != 0 && !configured)
         return REFUSED_UNCONFIGURED;
-    uint16_t taken = heater_set(power, valid_ms);
+    uint16_t taken = heater_set(power, &valid_ms);
     reply_begin(asked->sequence, 'W');
     reply_number(taken);
     reply_number(valid_ms);

@@ -1,0 +1,74 @@
+"""Every driver keeps the contract, each with a rig of its own."""
+
+from __future__ import annotations
+
+import pytest
+
+from thermoctl.errors import Unavailable
+from thermoctl.testing import Device, DriverContract, FaultyLink, LockStepLink, ManualClock, Rig
+from thermoctl_drivers.null import NullBoard, NullSettings
+from thermoctl_drivers.simulated import SimulatedBoard, SimulatedSettings
+from thermoctl_drivers.thermodaq import ThermoDaq, ThermoDaqSettings
+from thermoctl_drivers.thermodaq_board import BoardModel
+from thermoctl_drivers.thermodaq_chip import Chip
+
+LM335_AT_37_5_C_MV = 3106.5
+OBSERVED_S = 0.04
+
+
+def thermodaq_rig(device: BoardModel | Chip) -> Rig:
+    """Return the driver on a line to `device`, whose heater pin can be looked at."""
+    clock = ManualClock()
+    device.analog(LM335_AT_37_5_C_MV, noise_mv=5.0)
+    lock_step = LockStepLink(device, clock)
+    line = FaultyLink(lock_step, clock)
+    settings = ThermoDaqSettings(port="lock-step", average_periods=2)
+
+    def power() -> float:
+        lock_step.catch_up()
+        before_s = device.on_s
+        clock.advance(OBSERVED_S)
+        lock_step.catch_up()
+        return (device.on_s - before_s) / OBSERVED_S
+
+    return Rig(ThermoDaq(settings, line, clock), clock, line, power)
+
+
+class TestThermoDaqOnThePythonBoard(DriverContract):
+    def rig(self) -> Rig:
+        return thermodaq_rig(BoardModel())
+
+
+@pytest.mark.hil
+class TestThermoDaqOnTheChip(DriverContract):
+    def rig(self) -> Rig:
+        try:
+            return thermodaq_rig(Chip())
+        except Unavailable as missing:
+            pytest.skip(str(missing))
+
+
+class TestSimulated(DriverContract):
+    def rig(self) -> Rig:
+        clock = ManualClock()
+        board = SimulatedBoard(SimulatedSettings(power_stage="linear"), None, clock)
+
+        def power() -> float:
+            """Return what the heater gave over the next instant."""
+            clock.advance(OBSERVED_S)
+            board.open(clock.now_s())
+            return board.truth()["heater_w"] / 1500.0
+
+        return Rig(board, clock, power=power)
+
+
+class TestNull(DriverContract):
+    def rig(self) -> Rig:
+        clock = ManualClock()
+        return Rig(NullBoard(NullSettings(), None, clock), clock, output_name="")
+
+
+def test_a_device_satisfies_the_port_of_a_lock_step_line() -> None:
+    device: Device = BoardModel()
+    device.advance(0.1)
+    assert device.receive() == b""
