@@ -24,8 +24,10 @@ _BY_LEVEL: Final = {
     "error": (
         "board.lost",
         "board.wrong",
+        "config.refused",
         "controller.failed",
         "cycle.failed",
+        "estimator.failed",
         "output.nan",
         "output.readback",
         "output.refused",
@@ -34,6 +36,7 @@ _BY_LEVEL: Final = {
     ),
     "warning": (
         "board.retry",
+        "board.silent",
         "clock.stepped",
         "cycle.late",
         "cycle.missed",
@@ -43,6 +46,7 @@ _BY_LEVEL: Final = {
         "history.failed",
         "history.set_aside",
         "journal.drops",
+        "latch.kept",
         "latch.unsaved",
         "sensor.missing",
         "sensor.spike",
@@ -55,10 +59,13 @@ _BY_LEVEL: Final = {
         "config.loaded",
         "history.recovered",
         "latch.cleared",
+        "loop.not_resumed",
         "loop.started",
         "loop.stopped",
         "mode.changed",
+        "request.refused",
         "setpoint.changed",
+        "sim.disturbed",
         "state.changed",
     ),
 }
@@ -67,6 +74,9 @@ EVENTS: Final[Mapping[str, str]] = MappingProxyType(
     {name: level for level, names in _BY_LEVEL.items() for name in names}
 )
 """Level of every event by its name."""
+
+REASONS: Final = frozenset({"limit.high", "limit.low", "limit.rate", "sensor.good"})
+"""Dotted names that only occur as the reason of a power or of a change of state."""
 
 
 def level_of(name: str) -> str:

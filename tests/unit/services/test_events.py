@@ -1,0 +1,82 @@
+"""The registry of events, its page and the source agree with each other."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+from thermoctl.services.events import EVENTS, PRIORITIES, REASONS, level_of
+
+ROOT = Path(__file__).parents[3]
+NAME = re.compile(r"[a-z]+\.[a-z_]+")
+ROW = re.compile(r"\| `([a-z.0-9_]+)` \| (\w+) \|", re.MULTILINE)
+FILE_NAMES = re.compile(r".*\.(sqlite|lock|toml|json|csv|svg|png|elf)")
+FAMILIES = {name.split(".")[0] for name in (*EVENTS, *REASONS)}
+TELLERS = {
+    *("Event", "Alarm", "emit", "_emit", "report", "_report", "_tell", "note"),
+    *("fail", "fault", "latch", "_raise"),
+}
+
+
+def called(call: ast.Call) -> str:
+    match call.func:
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            return name
+    return ""
+
+
+def dotted(nodes) -> set[str]:
+    """Return the constants among `nodes` that read like the name of an event."""
+    texts = {node.value for node in nodes if isinstance(node, ast.Constant)}
+    return {
+        text
+        for text in texts
+        if isinstance(text, str) and NAME.fullmatch(text) and not FILE_NAMES.fullmatch(text)
+    }
+
+
+def names_in(source: str) -> set[str]:
+    """Return what is told as an event anywhere, and every other name of a known family."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call) and called(node) in TELLERS:
+            names |= dotted([*node.args, *(keyword.value for keyword in node.keywords)])
+        names |= {name for name in dotted([node]) if name.split(".")[0] in FAMILIES}
+    return names
+
+
+def test_every_event_in_the_source_is_registered():
+    rooms = (ROOT / "thermoctl", ROOT / "drivers" / "thermoctl_drivers")
+    sources = [path for room in rooms for path in room.rglob("*.py")]
+    found = {path: names_in(path.read_text(encoding="utf-8")) for path in sources}
+    unknown = {str(path): names - set(EVENTS) - REASONS for path, names in found.items()}
+    assert {path: names for path, names in unknown.items() if names} == {}
+    assert any(found.values())
+
+
+def test_the_search_finds_an_event_however_it_is_told():
+    source = """
+Event(0.0, "moon.landed")
+self._emit("tide.turned", x=1)
+Alarm(code="wolf.cried", fault=None)
+TABLE = {"sensor.melted": 1, "axes.grid": 2, "history.sqlite": 3}
+"""
+    assert names_in(source) == {"moon.landed", "tide.turned", "wolf.cried", "sensor.melted"}
+
+
+def test_the_page_lists_every_event_with_its_level_in_order():
+    page = (ROOT / "docs" / "events.md").read_text(encoding="utf-8")
+    rows = [(name, level) for name, level in ROW.findall(page) if level in PRIORITIES]
+    assert rows == sorted(EVENTS.items())
+
+
+def test_the_page_lists_every_reason():
+    page = (ROOT / "docs" / "events.md").read_text(encoding="utf-8")
+    _, reasons = page.split("## Reasons")
+    assert set(re.findall(r"^\| `([a-z._]+)` \|", reasons, re.MULTILINE)) == REASONS
+
+
+def test_an_unknown_name_is_a_warning():
+    assert level_of("plugin.surprised") == "warning"
+    assert level_of("sensor.open") == "error"
