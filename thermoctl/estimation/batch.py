@@ -10,7 +10,6 @@ Implements section 2 of ``docs/theory.md``.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -42,16 +41,6 @@ class Run:
     P: Array
     innovation: Array
     inflation: Array
-
-
-class _State(NamedTuple):
-    """One sample of every replication: (n, R), (n, n, R), (R,), (R,) and (R,)."""
-
-    theta: Array
-    P: Array
-    innovation: Array
-    inflation: Array
-    usable: npt.NDArray[np.bool_] | None
 
 
 def run_batch(
@@ -106,18 +95,20 @@ def _run(law: RecursiveLaw, y: Array, phi: Array, belief: Estimate, careful: boo
     theta, P = np.empty((T, n, R)), np.empty((T, n, n, R))
     innovation, inflation = np.empty((T, R)), np.empty((T, R))
     R1 = drift(law.R1, n)[:, :, None] if np.any(law.R1) else None
-    state = _State(
+    before: tuple[Array, ...] = (
         np.repeat(belief.theta[:, None], R, axis=1),
         np.repeat(belief.P[:, :, None], R, axis=2),
         np.full(R, belief.innovation),
         np.full(R, belief.inflation),
-        None,
     )
     for t in range(T):
-        new = _step(law, state, phi[t], y[t], R1, careful)
-        state = new if new.usable is None else _kept(state, new, new.usable)
-        theta[t], P[t] = state.theta, state.P
-        innovation[t], inflation[t] = state.innovation, state.inflation
+        after = (theta[t], P[t], innovation[t], inflation[t])
+        S = _advance(law, before[0], before[1], phi[t], y[t], R1, after)
+        if careful:
+            unusable = ~_usable(phi[t], S, *after[:3])
+            for new, old in zip(after, before, strict=True):
+                np.copyto(new, old, where=unusable)
+        before = after
     return Run(
         frozen(np.moveaxis(theta, 1, 2)),
         frozen(np.moveaxis(P, 3, 1)),
@@ -126,26 +117,39 @@ def _run(law: RecursiveLaw, y: Array, phi: Array, belief: Estimate, careful: boo
     )
 
 
-def _step(
-    law: RecursiveLaw, state: _State, phi: Array, y: Array, R1: Array | None, careful: bool
-) -> _State:
-    """Return the state after one sample; `phi` has shape (n, R) and `y` (R,)."""
-    n = len(phi)
-    P_phi = _dot(state.P, phi)  # P is symmetric: its rows are its columns
-    e = y - _dot(state.theta, phi)
-    S, inflation = law.weigh(np.maximum(_dot(P_phi, phi), 0.0), e, n, ARRAYS)
+def _advance(
+    law: RecursiveLaw,
+    theta: Array,
+    P: Array,
+    phi: Array,
+    y: Array,
+    R1: Array | None,
+    after: tuple[Array, Array, Array, Array],
+) -> Array:
+    """Write theta, P, e and the inflation of every replication into `after`, and return S.
+
+    `theta` and `phi` have shape (n, R), P has (n, n, R) and `y`, e, S and the inflation have (R,).
+    """
+    new_theta, new_P, e, inflation = after
+    P_phi = _dot(P, phi)  # P is symmetric: its rows are its columns
+    np.subtract(y, _dot(theta, phi), out=e)
+    S, inflation[:] = law.weigh(np.maximum(_dot(P_phi, phi), 0.0), e, len(phi), ARRAYS)
     root = np.sqrt(S)
     g = P_phi / root
-    theta = state.theta + g * (e / root)  # O21 (18), (19)
-    P = (state.P - g[:, None] * g) * inflation  # O21 (21), (25), (13)
+    np.add(theta, g * (e / root), out=new_theta)  # O21 (18), (19)
+    np.subtract(P, g[:, None] * g, out=new_P)  # O21 (21)
+    new_P *= inflation  # O21 (25), or (13) with 1/lambda
     if R1 is not None:
-        P += R1  # O21 (20)
-    usable = None
-    if careful:
-        size = (P * P).sum(axis=(0, 1)) + (theta * theta).sum(axis=0)
-        usable = np.abs(phi).sum(axis=0) < LARGEST
-        usable &= (e * e < LARGEST * S) & (size < LARGEST * LARGEST)
-    return _State(theta, P, e, np.broadcast_to(inflation, e.shape), usable)
+        new_P += R1  # O21 (20)
+    return S
+
+
+def _usable(phi: Array, S: Array, theta: Array, P: Array, e: Array) -> npt.NDArray[np.bool_]:
+    """Return where `RecursiveLaw.update` would take the sample, shape (R,); false for NaN."""
+    size = (P * P).sum(axis=(0, 1)) + (theta * theta).sum(axis=0)
+    usable: npt.NDArray[np.bool_] = np.abs(phi).sum(axis=0) < LARGEST
+    usable &= (e * e < LARGEST * S) & (size < LARGEST * LARGEST)
+    return usable
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -154,17 +158,6 @@ def _dot(a: Array, b: Array) -> Array:
     for j in range(1, len(b)):
         total = total + a[j] * b[j]
     return total
-
-
-def _kept(old: _State, new: _State, usable: npt.NDArray[np.bool_]) -> _State:
-    """Return `new` where its samples are usable and `old` elsewhere."""
-    return _State(
-        np.where(usable, new.theta, old.theta),
-        np.where(usable, new.P, old.P),
-        np.where(usable, new.innovation, old.innovation),
-        np.where(usable, new.inflation, old.inflation),
-        None,
-    )
 
 
 def _sane(phi: Array, run: Run) -> bool:

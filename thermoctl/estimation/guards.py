@@ -79,6 +79,10 @@ class Guarded:
     robust_R2 : bool
         Take R2 from a parallel least squares with forgetting .95: (1.4826 median |e|)^2 over its
         last 60 innovations. For the two Kalman filters.
+    R2_min : float, optional
+        Least R2 that `robust_R2` may find. Where the model is known to be too simple, as that of
+        O21 (27) is for a plant with lag, what it cannot explain is not noise: with the law's own
+        R2 here the estimate can only make the law more patient.
 
     Raises
     ------
@@ -92,6 +96,7 @@ class Guarded:
     covariance_max: float | None = None
     excitation_min: float | None = None
     robust_R2: bool = False  # noqa: N815 - R2 keeps its letter
+    R2_min: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, RecursiveLaw):
@@ -100,6 +105,8 @@ class Guarded:
             positive("covariance_max", self.covariance_max)
         if self.excitation_min is not None:
             positive("excitation_min", self.excitation_min)
+        if self.R2_min is not None:
+            positive("R2_min", self.R2_min)
         if self.robust_R2 and not isinstance(self.law, RandomWalkKalman | CorrectedKalman):
             raise ValueError(f"robust_R2 needs a law with R2, got {type(self.law).__name__}")
 
@@ -149,7 +156,8 @@ class Guarded:
         assert isinstance(law, RandomWalkKalman | CorrectedKalman)
         middle = len(memory.residuals) // 2
         sd = NORMAL_SD * float(np.partition(memory.residuals, middle)[middle])
-        return replace(law, R2=max(sd * sd, R2_FLOOR * law.R2))
+        least = R2_FLOOR * law.R2 if self.R2_min is None else self.R2_min
+        return replace(law, R2=max(sd * sd, least))
 
     def _remembered(self, before: GuardedEstimate, phi: Array, y: float) -> _Memory:
         """Return the memory after a usable sample."""

@@ -83,4 +83,6 @@ class CorrectedKalman(RecursiveLaw):
         """Return ``q + R2`` and lambda*."""
         S = q + self.R2
         inflation = arithmetic.maximum(1.0, e * e / (S * (n + 1)))  # O21 (26)
-        return S, arithmetic.minimum(self.inflation_max, inflation)
+        if self.inflation_max < math.inf:
+            inflation = arithmetic.minimum(self.inflation_max, inflation)
+        return S, inflation
