@@ -199,10 +199,11 @@ class _LiveBench:
                 self._loop.ask(request, self._last.loop)
 
     def _disturb(self, action: Action) -> None:
-        for board in self._loop.boards:
-            if isinstance(board.board, Simulated):
+        for connection in self._loop.boards:
+            plant: object = connection.board
+            if isinstance(plant, Simulated):
                 try:
-                    what = board.board.disturb(action.value)
+                    what = plant.disturb(action.value)
                 except Refused as refusal:
                     what = str(refusal)
                 self._model.note(Event(self._clock.now_s(), "sim.disturbed", {"text": what}))

@@ -107,11 +107,14 @@ def _guarded(law: Estimator, table: EstimatorTable, model: ModelTable) -> Estima
     excitation_min = guards.excitation_min
     if excitation_min is None and model.structure == "arx":
         excitation_min = _ARX_EXCITATION_MIN
+    kalman = isinstance(law, RandomWalkKalman | CorrectedKalman)
+    too_simple = model.structure == "known-gain"  # its innovations are lag as much as noise
     return Guarded(
         law,  # type: ignore[arg-type]
         covariance_max=guards.covariance_max or table.P0,
         excitation_min=excitation_min,
-        robust_R2=guards.robust_R2 and isinstance(law, RandomWalkKalman | CorrectedKalman),
+        robust_R2=guards.robust_R2 and kalman,
+        R2_min=getattr(law, "R2", None) if too_simple else None,
     )
 
 

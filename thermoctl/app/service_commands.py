@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -158,8 +159,7 @@ def export(
         settings = _settings(configs) if configs or not state else None
         name = settings.history.file if settings else "history.sqlite"
         file = _state_of_daemon(settings, state) / name
-    target = out if out is not None else click.get_text_stream("stdout")
-    count = write_csv(file, target, _moment(since), _moment(until), loop)
+    count = write_csv(file, out or sys.stdout, _moment(since), _moment(until), loop)
     if out is not None:
         click.echo(f"{count} cycles written to {out}", err=True)
 

@@ -88,7 +88,9 @@ class GuardsTable(Table):
         "structure arx, and off for known-gain, whose learning at rest is its integral action.",
     )
     robust_R2: bool = Field(  # noqa: N815 - R2 keeps its letter
-        True, description="Estimate R2 beside a Kalman filter instead of taking it as given."
+        True,
+        description="Estimate R2 beside a Kalman filter; with structure known-gain the estimate "
+        "may only raise it.",
     )
 
 

@@ -147,7 +147,8 @@ class View:
     @property
     def age_s(self) -> float:
         """Return how long ago the last good sample was; NaN when there was none."""
-        return max(0.0, self.now_s - self.last_good_s) if self.now_s == self.now_s else _NAN
+        age_s = self.now_s - self.last_good_s
+        return 0.0 if age_s < 0.0 else age_s  # NaN stays NaN
 
     @property
     def stale(self) -> bool:
