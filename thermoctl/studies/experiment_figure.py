@@ -40,7 +40,7 @@ def draw_experiment(run: Run, measures: Measures, title: str, paths: list[Path])
             _draw_output(run, part, axes[0, column])
             _draw_input(run, part, axes[1, column])
             _draw_pole(run, part, axes[2, column])
-            unit_s, unit = house.minutes_or_hours(float(run.t_s[part][-1] - run.t_s[part][0]))
+            unit_s, unit = house.time_unit(float(run.t_s[part][-1] - run.t_s[part][0]))
             for panel in axes[:, column]:
                 panel.set_xlim(run.t_s[part][0], run.t_s[part][-1])
                 _time_axis(panel, unit_s)

@@ -196,7 +196,7 @@ def envelope(x: Array, y: Array, limit: int = POINTS_PER_PANEL) -> tuple[Array, 
     return x[keep], y[keep]
 
 
-def minutes_or_hours(duration_s: float) -> tuple[float, str]:
+def time_unit(duration_s: float) -> tuple[float, str]:
     """Return seconds in the unit a time axis of `duration_s` is best read in, and its name."""
     for unit_s, name in ((1.0, "s"), (60.0, "min"), (3600.0, "h")):
         if duration_s <= 150.0 * unit_s:

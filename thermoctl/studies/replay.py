@@ -107,7 +107,8 @@ class Trace:
     index : ndarray, shape (K,)
         Samples at which an estimate was kept.
     theta, theta_sd : ndarray, shape (K, n)
-        Estimates there, and their standard deviations.
+        Estimates there, and their standard deviations; NaN where a law lost its way and P holds a
+        negative variance.
     innovation, innovation_sd : ndarray, shape (T,)
         One-step prediction errors and what the law expected of them; NaN where none was made.
     """
@@ -301,7 +302,7 @@ def _run(
     trace = Trace(
         places,
         theta * unit,
-        np.sqrt(prepared.unit_variance * np.maximum(P_diagonal, 0.0)) * unit,
+        np.sqrt(prepared.unit_variance * np.where(P_diagonal >= 0.0, P_diagonal, math.nan)) * unit,
         innovation * conditions.y_scale,
         np.sqrt(prepared.unit_variance * variance) * conditions.y_scale,
     )

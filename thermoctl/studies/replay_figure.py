@@ -70,7 +70,7 @@ def _time_unit(result: Replay) -> tuple[float, str]:
     """Return the unit of the time axis; rows stay rows."""
     if result.record.names.time is None:
         return 1.0, "row"
-    return house.minutes_or_hours(float(result.record.t_s[-1]))
+    return house.time_unit(float(result.record.t_s[-1]))
 
 
 def _draw_record(result: Replay, output: Any, entry: Any, unit_s: float) -> None:
@@ -117,17 +117,16 @@ def _draw_parameter(result: Replay, place: int, name: str, panel: Any, unit_s: f
 
 def _scale(result: Replay, place: int) -> tuple[float, float]:
     """Return the limits of a parameter's panel; what the laws did while learning may leave it."""
-    parts = []
+    ends = []
     for rank, trace in enumerate(result.traces[: len(house.HUES)]):
         late = trace.index >= result.conditions.scored_from
-        theta = trace.theta[late, place]
-        low, high = np.percentile(theta, (2, 98))
+        theta, sd = trace.theta[late, place], trace.theta_sd[late, place]
         # The median: with an input that stands still the band is wider than any panel for a while.
-        spread = 2.0 * float(np.median(trace.theta_sd[late, place])) if rank == 0 else 0.0
-        parts += [low - spread, high + spread, float(theta[-1])]
-    values = np.array(parts)
-    values = values[np.isfinite(values)]
-    low, high = float(values.min()), float(values.max())
+        known = sd[np.isfinite(sd)]
+        spread = 2.0 * float(np.median(known)) if rank == 0 and len(known) else 0.0
+        low, high = np.percentile(theta, (2, 98))
+        ends += [low - spread, high + spread, float(theta[-1])]
+    low, high = min(ends), max(ends)
     margin = 0.1 * (high - low) or 0.1 * abs(high) or 1.0
     return low - margin, high + margin
 
@@ -141,6 +140,11 @@ def _draw_innovations(result: Replay, place: int, panel: Any, unit_s: float) -> 
         values[known]
         for values in (result.record.t_s / unit_s, trace.innovation, trace.innovation_sd)
     )
+    house.label(panel, 0.0, score.name, house.TEXT)
+    panel.set_ylabel("$e$")
+    if not len(e):
+        house.score(panel, "every sample was rejected")
+        return
     outside = np.abs(e) > 2.0 * sd
     shown = _thinned(len(e))
     panel.fill_between(
@@ -151,8 +155,6 @@ def _draw_innovations(result: Replay, place: int, panel: Any, unit_s: float) -> 
     panel.plot(t[outside], e[outside], color=house.OUTSIDE, markersize=2.0, **style)
     reach = max(2.5 * float(np.median(sd)), float(np.percentile(np.abs(e), 99.5)))
     panel.set_ylim(-1.15 * reach, 1.15 * reach)
-    panel.set_ylabel("$e$")
-    house.label(panel, 0.0, score.name, house.TEXT)
     house.score(panel, _innovation_words(result, place, float(np.mean(~outside))))
 
 

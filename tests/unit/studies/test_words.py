@@ -1,0 +1,44 @@
+import math
+
+import pytest
+
+from thermoctl.studies.words import duration, number, probability
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "words"),
+    [
+        (-0.46410, 0.0657, "−0.46 ± 0.13"),
+        (0.999764, 0.00003, "0.999764 ± 0.000060"),
+        (41.26, 6.0, "41 ± 12"),
+        (2.0, 0.0, "2 ± 0"),
+        (-1e140, 1e130, "−1e+140 ± 2e+130"),
+        (math.nan, 1.0, "–"),
+        (1.0, math.inf, "–"),
+    ],
+)
+def test_a_value_has_the_decimals_its_error_deserves(value, sd, words):
+    assert number(value, sd) == words
+
+
+@pytest.mark.parametrize(
+    ("p", "words"),
+    [(1e-20, "< 0.001"), (0.0123, "0.012"), (0.4567, "0.46"), (1.0, "1.00"), (math.nan, "–")],
+)
+def test_a_probability_is_not_written_finer_than_it_is_known(p, words):
+    assert probability(p) == words
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [
+        (0.25, "0.25 s"),
+        (60.0, "1 min"),
+        (61.0, "1 min 1 s"),
+        (8995.0, "2 h 29 min"),
+        (7200.0, "2 h"),
+        (2_000_000.0, "23 d 3 h"),
+    ],
+)
+def test_a_duration_is_told_in_its_two_largest_units(seconds, words):
+    assert duration(seconds) == words
