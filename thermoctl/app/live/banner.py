@@ -128,7 +128,7 @@ def values_row(view: View, look: Look, width: int) -> Text:
         role = Role.MUTE if view.stale else Role.STRONG
         change = f"  {numbers.difference(view.deviation_k):>8}"
         left = [(numbers.temperature(value_c), role), (change, Role.TEXT)]
-    left += [("    set ", Role.MUTE), (numbers.temperature(step.setpoint_c), Role.STRONG)]
+    left += [("    set ", Role.MUTE), (numbers.temperature(view.setpoint_c), Role.STRONG)]
     left += [("    power ", Role.MUTE)]
     if math.isnan(view.accepted_power):
         left += [(numbers.UNKNOWN, Role.STRONG), (" nothing accepted", Role.TEXT)]
@@ -160,5 +160,5 @@ def one_line(view: View, look: Look, width: int) -> Text:
     words += ["STALE"] if view.stale else []
     words += [why(view)] if why(view) else []
     words += [numbers.temperature(view.temperature_c), numbers.difference(view.deviation_k)]
-    words += [f"set {numbers.temperature(step.setpoint_c)}", numbers.power(view.accepted_power)]
+    words += [f"set {numbers.temperature(view.setpoint_c)}", numbers.power(view.accepted_power)]
     return fitted(look.text(("  ".join(words), Role.TEXT)), width)

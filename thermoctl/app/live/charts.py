@@ -158,8 +158,7 @@ def temperature(chart: Frame, rows: int) -> list[Text]:
     value_row = _row_of(float(level(np.array(view.temperature_c))), rows)
     if value_row >= 0:
         gutters[value_row] = (numbers.number(view.temperature_c, 2), Role.STRONG)
-    setpoint_c = view.step.setpoint_c if view.step else math.nan
-    set_row = _row_of(float(level(np.array(setpoint_c))), rows)
+    set_row = _row_of(float(level(np.array(view.setpoint_c))), rows)
     if set_row >= 0 and set_row == value_row:
         set_row += 1 if set_row + 1 < rows else -1
     if set_row >= 0:

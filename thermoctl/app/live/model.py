@@ -26,6 +26,7 @@ DEVIATION_SAMPLES = 600
 
 STALE_PERIODS = 3.0
 _EVENTS_KEPT = 200
+_LARGEST = 1e9  # beyond it a number is a fault, and its square would soon overflow
 _NAN = math.nan
 
 
@@ -160,12 +161,17 @@ class View:
         """Return the temperature of the last step; NaN unless it was a good sample."""
         if self.step is None or self.step.measurement.quality is not Quality.GOOD:
             return _NAN
-        return self.step.measurement.temperature_c
+        return _known(self.step.measurement.temperature_c)
+
+    @property
+    def setpoint_c(self) -> float:
+        """Return the set point; NaN before the first step."""
+        return _NAN if self.step is None else _known(self.step.setpoint_c)
 
     @property
     def deviation_k(self) -> float:
         """Return temperature minus set point; NaN when either is not known."""
-        return _NAN if self.step is None else self.temperature_c - self.step.setpoint_c
+        return self.temperature_c - self.setpoint_c
 
     @property
     def beliefs(self) -> Beliefs:
@@ -174,7 +180,8 @@ class View:
 
 
 def _known(value: float | None) -> float:
-    return _NAN if value is None else value
+    """Return `value`, or NaN when it is none, not finite, or too large to be believed."""
+    return value if value is not None and -_LARGEST < value < _LARGEST else _NAN
 
 
 def _in_sigma(step: Step) -> float:
@@ -182,7 +189,7 @@ def _in_sigma(step: Step) -> float:
     estimate = step.estimate
     if estimate.rejected or not estimate.innovation_var > 0.0:
         return _NAN
-    return estimate.innovation / math.sqrt(estimate.innovation_var)
+    return _known(estimate.innovation / math.sqrt(estimate.innovation_var))
 
 
 class LiveModel:
@@ -215,24 +222,26 @@ class LiveModel:
         self._cycle = cycle
         measurement, beliefs = step.measurement, step.beliefs
         temperature_c = _NAN
-        if measurement.quality is Quality.GOOD and math.isfinite(measurement.temperature_c):
-            temperature_c = measurement.temperature_c
-            self._last_good_s = step.t_s
+        if measurement.quality is Quality.GOOD:
+            temperature_c = _known(measurement.temperature_c)
+            if temperature_c == temperature_c:
+                self._last_good_s = step.t_s
         if self._first_s != self._first_s:
             self._first_s = step.t_s
-        deviation_k = temperature_c - step.setpoint_c
+        setpoint_c = _known(step.setpoint_c)
+        deviation_k = temperature_c - setpoint_c
         self._innovations.append(_in_sigma(step))
         self._deviations_k.append(deviation_k)
-        self._ticks_us.append(cycle.tick_us)
+        self._ticks_us.append(_known(cycle.tick_us))
         self._scale.grow(temperature_c)
-        self._scale.grow(step.setpoint_c)
+        self._scale.grow(setpoint_c)
         self._recorder.add(
             step.t_s,
             (temperature_c, 1e3 * deviation_k),
             (
-                cycle.accepted_power,
-                step.estimate.inflation,
-                step.setpoint_c,
+                _known(cycle.accepted_power),
+                _known(step.estimate.inflation),
+                setpoint_c,
                 _known(beliefs.gain),
                 _known(beliefs.a),
                 _known(beliefs.holding_power),
@@ -253,7 +262,7 @@ class LiveModel:
             facts=self.facts,
             now_s=now_s,
             step=None if cycle is None else cycle.step,
-            accepted_power=_NAN if cycle is None else cycle.accepted_power,
+            accepted_power=_NAN if cycle is None else _known(cycle.accepted_power),
             last_good_s=self._last_good_s,
             trend=self._recorder.trend(),
             range_s=self._range_s,

@@ -1,0 +1,47 @@
+import math
+
+import pytest
+
+from thermoctl.app.live.sentences import _SENTENCES, Mark, sentence
+from thermoctl.signals import Event
+
+
+def test_a_known_event_becomes_a_sentence_with_units() -> None:
+    said = sentence(Event(3.0, "setpoint.changed", {"before_c": 25.0, "after_c": 37.5}))
+    assert said.text == "Set point 37.50\u00a0°C, was 25.00\u00a0°C"
+    assert (said.t_s, said.name, said.mark) == (3.0, "setpoint.changed", Mark.NONE)
+
+
+def test_a_known_event_without_its_fields_is_still_a_sentence() -> None:
+    for name in _SENTENCES:
+        text = sentence(Event(0.0, name)).text
+        assert text
+        assert "{" not in text
+        if name not in ("change.detected", "sim.disturbed"):
+            assert text[0].isupper()
+
+
+def test_an_unknown_event_is_spelt_out_with_its_fields() -> None:
+    said = sentence(Event(0.0, "pump.run_dry", {"flow_w": 3.0, "text": "no flow"}))
+    assert said.text == "Pump run dry: flow_w 3\u00a0W, no flow"
+    assert said.mark is Mark.NONE
+
+
+def test_an_alarm_without_a_sentence_is_still_a_warning() -> None:
+    assert sentence(Event(0.0, "alarm.rate", {"text": "too fast"})).mark is Mark.WARNING
+
+
+@pytest.mark.parametrize(
+    ("state", "mark"),
+    [("run", Mark.NONE), ("ride", Mark.WARNING), ("safe", Mark.ALARM), ("latched", Mark.ALARM)],
+)
+def test_a_state_is_marked_by_how_bad_it_is(state: str, mark: Mark) -> None:
+    fields = {"before": "run", "after": state, "why": "sensor.open"}
+    assert sentence(Event(0.0, "state.changed", fields)).mark is mark
+
+
+def test_no_field_can_bring_a_nan_or_a_template_into_a_sentence() -> None:
+    for name in (*_SENTENCES, "never.seen"):
+        fields = dict.fromkeys(("temperature_c", "after_c", "before_c", "late_s"), math.nan)
+        said = sentence(Event(0.0, name, {**fields, "text": "{0} {x!r} %s"}))
+        assert "nan" not in said.text.lower().replace("output nan", "")
