@@ -63,7 +63,7 @@ def plan_for(name: str, table: LoopTable) -> Plan:
     try:
         return Plan(
             limits=_limits(table),
-            identifier=_identifier(table.estimator, table.model, structure),
+            identifier=_identifier(table.estimator, structure, table.setpoint_c),
             controller=_controller(table, structure),
             setpoint_c=table.setpoint_c,
             mode=table.mode,
@@ -92,30 +92,43 @@ def _structure(table: ModelTable, period_s: float) -> Arx | KnownGain:
     return Arx(table.n, table.m, y_centre_c=table.centre_c, y_scale_k=table.scale_k)
 
 
-def _identifier(table: EstimatorTable, model: ModelTable, structure: Arx | KnownGain) -> Identifier:
+def _identifier(table: EstimatorTable, structure: Arx | KnownGain, setpoint_c: float) -> Identifier:
     law = plugins.build(plugins.find(plugins.ESTIMATORS, table.kind), table.options)
     theta0 = table.theta0
     if theta0 is None and isinstance(structure, KnownGain):
         theta0 = (1.0,)  # a plant without loss keeps its temperature
-    return Identifier(structure, _guarded(law, table, model), theta0, table.P0)
+    return Identifier(structure, _guarded(law, table, structure, setpoint_c), theta0, table.P0)
 
 
-def _guarded(law: Estimator, table: EstimatorTable, model: ModelTable) -> Estimator:
+def _guarded(
+    law: Estimator, table: EstimatorTable, structure: Arx | KnownGain, setpoint_c: float
+) -> Estimator:
     guards = table.guards
     if not guards.enabled:
         return law
     excitation_min = guards.excitation_min
-    if excitation_min is None and model.structure == "arx":
+    if excitation_min is None and isinstance(structure, Arx):
         excitation_min = _ARX_EXCITATION_MIN
     kalman = isinstance(law, RandomWalkKalman | CorrectedKalman)
-    too_simple = model.structure == "known-gain"  # its innovations are lag as much as noise
+    too_simple = isinstance(structure, KnownGain)  # its innovations are lag as much as noise
     return Guarded(
         law,  # type: ignore[arg-type]
-        covariance_max=guards.covariance_max or table.P0,
+        covariance_max=guards.covariance_max or _covariance_max(table, structure, setpoint_c),
         excitation_min=excitation_min,
         robust_R2=guards.robust_R2 and kalman,
         R2_min=getattr(law, "R2", None) if too_simple else None,
     )
+
+
+def _covariance_max(table: EstimatorTable, structure: Arx | KnownGain, setpoint_c: float) -> float:
+    """Return the cap on P when none is set: P0, or for a known gain what physics allows.
+
+    A loss, (1 - a) times the temperature, that is less certain than the heater's full power would
+    make no sense; a noisy converter would otherwise keep the pole jumping.
+    """
+    if isinstance(structure, Arx):
+        return table.P0
+    return min(table.P0, (structure.b_k / max(abs(setpoint_c), 1.0)) ** 2)
 
 
 def _controller(table: LoopTable, structure: Arx | KnownGain) -> Controller:

@@ -80,7 +80,9 @@ class GuardsTable(Table):
 
     enabled: bool = Field(True, description="False: the bare law, as printed.")
     covariance_max: Positive | None = Field(
-        None, description="Cap on the diagonal of P; P0 when absent."
+        None,
+        description="Cap on the diagonal of P; when absent P0 for structure arx, and for known-gain the "
+        "square of gain over set point.",
     )
     excitation_min: Positive | None = Field(
         None,
