@@ -44,9 +44,7 @@ def test_the_unit_is_understood_without_a_word(tmp_path):
 def test_a_wrong_line_would_be_noticed(tmp_path, wrong):
     unit = UNIT.replace("Type=notify\n", f"Type=notify\n{wrong}\n")
     # systemd-analyze exits 0 on these, which is why the test above asks for silence
-    assert analyze(
-        tmp_path, UNIT.replace("Type=notify\n", f"Type=notify\n{wrong}\n"), "verify"
-    ).stderr
+    assert analyze(tmp_path, unit, "verify").stderr
 
 
 def test_the_lines_for_real_time_are_understood_too(tmp_path):
