@@ -32,7 +32,7 @@ struct queue {
 struct board {
     avr_t *avr;
     struct queue in, out;
-    uint64_t on_cycles, edges, zero_power_since;
+    uint64_t on_cycles, edges, off_since;
     uint64_t half_wave_cycles;
     int level, crossing_high, feeding;
     double millivolts, noise_mv, pickup_mv, mains_hz;
@@ -86,8 +86,9 @@ static void convert(struct avr_irq_t *irq, uint32_t value, void *parameter)
                 board->pickup_mv * sin(2.0 * M_PI * board->mains_hz * t_s);
     if (mv < 0.0)
         mv = 0.0;
+    /* simavr scales by 1023 where the converter scales by 1024; it takes whole millivolts. */
     avr_raise_irq(avr_io_getirq(board->avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_ADC0),
-                  (uint32_t)(mv + 0.5));
+                  (uint32_t)(mv * 1024.0 / 1023.0 + 0.5));
 }
 
 static avr_cycle_count_t feed(avr_t *avr, avr_cycle_count_t when, void *parameter)
@@ -170,7 +171,7 @@ int thermodaq_sim_run(struct board *board, uint64_t cycles)
         int level = (avr->data[DDRD_ADDRESS] & avr->data[PORTD_ADDRESS] & HEATER_MASK) != 0;
         board->edges += level && !board->level;
         if (board->level && !level)
-            board->zero_power_since = avr->cycle;
+            board->off_since = avr->cycle;
         board->level = level;
     }
     return 0;
@@ -217,6 +218,9 @@ void thermodaq_sim_crossings(struct board *board, uint64_t half_wave_cycles)
 void thermodaq_sim_reset(struct board *board)
 {
     avr_reset(board->avr);
+    if (board->level)
+        board->off_since = board->avr->cycle; /* a reset chip lets go of its pins at once */
+    board->level = 0;
     board->in.tail = board->in.head;
     board->feeding = 0;
     uint64_t half_wave_cycles = board->half_wave_cycles;
@@ -237,7 +241,7 @@ void thermodaq_sim_poke(struct board *board, uint16_t address, uint8_t value)
 uint64_t thermodaq_sim_cycle(const struct board *board) { return board->avr->cycle; }
 uint64_t thermodaq_sim_on_cycles(const struct board *board) { return board->on_cycles; }
 uint64_t thermodaq_sim_edges(const struct board *board) { return board->edges; }
-uint64_t thermodaq_sim_off_since(const struct board *board) { return board->zero_power_since; }
+uint64_t thermodaq_sim_off_since(const struct board *board) { return board->off_since; }
 int thermodaq_sim_level(const struct board *board) { return board->level; }
 uint8_t thermodaq_sim_peek(const struct board *board, uint16_t address)
 {
