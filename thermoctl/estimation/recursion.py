@@ -94,7 +94,7 @@ class RecursiveLaw(ABC):
         e = float(y) - float(theta.dot(phi))
         q = max(float(phi.dot(P_phi)), 0.0)  # rounding can leave a vanishing one below zero
         S, inflation = self.weigh(q, e, len(theta), NUMBERS)
-        if not e * e < LARGEST * S:
+        if not e * e < LARGEST * S < math.inf:
             return rejected(belief)
         root = math.sqrt(S)
         g = P_phi / root
@@ -108,7 +108,7 @@ class RecursiveLaw(ABC):
             P += drift(R1, len(theta))  # O21 (20)
         elif R1:
             P += R1 * identity(len(theta))  # O21 (20)
-        if not np.vdot(P, P) + theta.dot(theta) < LARGEST * LARGEST:
+        if not float(np.vdot(P, P)) + float(theta.dot(theta)) < LARGEST * LARGEST:
             return rejected(belief)
         return Estimate(frozen(theta), frozen(P), e, S, inflation, False)
 

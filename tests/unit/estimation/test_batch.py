@@ -108,6 +108,14 @@ def test_a_guarded_law_is_refused_because_it_has_a_memory():
         run_batch(Guarded(CorrectedKalman()), np.zeros((5, 2)), np.zeros((5, 2, 1)))
 
 
+def test_a_covariance_that_would_overflow_is_refused_in_one_replication_only():
+    phi = np.ones((60, 2, 1))
+    phi[:, 0] = 0.0
+    P = run_batch(RecursiveLeastSquares(0.01), np.zeros((60, 2)), phi).P[-1, :, 0, 0]
+    assert 1e45 < P[0] < 1e51
+    assert P[1] == pytest.approx(0.99)
+
+
 def test_a_run_of_no_samples_is_empty():
     run = run_batch(CorrectedKalman(), np.zeros((0, 2)), np.zeros((0, 2, 1)))
     assert run.theta.shape == (0, 2, 1)

@@ -10,6 +10,7 @@ import pytest
 
 from thermoctl.estimation import (
     CorrectedKalman,
+    Estimate,
     RandomWalkKalman,
     RecursiveLeastSquares,
     VariableForgetting,
@@ -177,7 +178,7 @@ def test_covariance_stays_symmetric_to_the_last_bit(law):
 
 
 @by_law
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e300])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e140, 1e300])
 def test_a_sample_that_is_not_finite_changes_nothing_but_the_mark(law, bad):
     phi, y = samples(2, 20)
     before = taught(law, start(2), phi, y)
@@ -200,6 +201,15 @@ def test_one_bad_sample_leaves_the_trajectory_as_if_it_had_not_come(law):
     dirty = taught(law, dirty, phi[20:], y[20:])
     assert np.array_equal(clean.theta, dirty.theta)
     assert np.array_equal(clean.P, dirty.P)
+
+
+@by_law
+@pytest.mark.parametrize("negative", [-1e-18, -0.5, -1.0, -1e6])
+def test_a_covariance_that_is_none_any_more_does_not_stop_the_loop(law, negative):
+    indefinite = Estimate(np.zeros(1), np.full((1, 1), negative))
+    belief = law.update(indefinite, np.ones(1), 0.5)
+    assert belief.innovation_var > 0.0
+    assert math.isfinite(belief.P.item())
 
 
 def test_a_covariance_that_would_overflow_is_refused_before_it_does():
@@ -287,6 +297,13 @@ def test_a_drift_of_another_size_than_the_belief_is_named():
 def test_a_constructor_names_the_argument_that_is_wrong(name, build):
     with pytest.raises(ValueError, match=name):
         build()
+
+
+def test_a_start_that_is_symmetric_but_for_rounding_is_made_symmetric():
+    P0 = np.array([[2.0, 0.3], [0.3 + 1e-15, 1.0]])
+    assert P0[0, 1] != P0[1, 0]
+    assert np.array_equal(start(2, P0).P, start(2, P0).P.T)
+    assert np.array_equal(CorrectedKalman(P0).R1, CorrectedKalman(P0).R1.T)
 
 
 def test_a_law_keeps_its_own_copy_of_its_constants():
