@@ -166,10 +166,14 @@ def temperature(chart: Frame, rows: int) -> list[Text]:
     return [chart.row(labels[row], grid, row, gutters[row]) for row in range(rows)]
 
 
-def _off_scale(chart: Frame, outside: braille.Dots, known: braille.Dots) -> str:
-    """Return which cells get a mark: wholly off the scale, the first and every third of a run."""
+def _off_scale(chart: Frame, outside: braille.Dots, known: braille.Dots, edge: str) -> str:
+    """Return which cells get a mark: wholly off the scale, the first and every third of a run.
+
+    `edge` is the row the marks go to: a line that leaves the scale there shows it already.
+    """
     pairs_out, pairs_known = outside.reshape(-1, 2), known.reshape(-1, 2)
     off = np.any(pairs_out, axis=1) & np.all(pairs_out | ~pairs_known, axis=1)
+    off &= np.array([cell == " " for cell in edge])
     begins = off & ~np.concatenate([[False], off[:-1]])
     third = (chart.first_cell + np.arange(chart.cells)) % 3 == 0
     return "".join("x" if marked else " " for marked in (off & (begins | third)).tolist())
@@ -191,10 +195,11 @@ def deviation(chart: Frame, rows: int) -> list[Text]:
     curve = braille.envelope(*braille.joined(level(low_mk), level(high_mk)), dots)
     # The dots of the band go on through the cells of the curve, or it would hide its own limits.
     drawn = curve | (limits & braille.occupied(curve))
-    grid.paint(braille.cells(drawn, utf8=look.utf8), Role.INK)
+    lines = braille.cells(drawn, utf8=look.utf8)
+    grid.paint(lines, Role.INK)
     known = ~np.isnan(low_mk)
-    above = _off_scale(chart, low_mk > DEVIATION_SCALE_MK, known)
-    below = _off_scale(chart, high_mk < -DEVIATION_SCALE_MK, known)
+    above = _off_scale(chart, low_mk > DEVIATION_SCALE_MK, known, lines[0])
+    below = _off_scale(chart, high_mk < -DEVIATION_SCALE_MK, known, lines[-1])
     grid.put(0, 0, above.replace("x", "▴"), Role.MUTE)
     grid.put(rows - 1, 0, below.replace("x", "▾"), Role.MUTE)
     _changes(chart, grid, named=False)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 from functools import cache
 
+from rich.console import Console
+from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 
@@ -115,6 +117,9 @@ _ASCII = str.maketrans(
 )
 
 
+_STYLE_BOOK = Console(quiet=True)  # only asked what a style means; it never prints
+
+
 @cache
 def _style(colour: Colour, role: Role) -> Style:
     return Style.parse(_STYLES[colour][role])
@@ -155,6 +160,11 @@ class Look:
         for string, role in parts:
             line.append(printable(string, utf8=self.utf8), self.style(role))
         return line
+
+
+def segments(line: Text) -> Iterable[Segment]:
+    """Return the pieces of `line` that have one style, from left to right."""
+    return line.render(_STYLE_BOOK)
 
 
 def look_for(encoding: str | None, environ: Mapping[str, str] | None = None) -> Look:

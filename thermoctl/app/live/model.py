@@ -116,7 +116,8 @@ class Recent:
     whiteness : Whiteness or None
         None when it cannot be judged yet.
     deviation_sd_k, deviation_max_k : float
-        From the set point, over `DEVIATION_SAMPLES`.
+        Standard deviation, about the mean, and largest size of the deviation from the set point,
+        over the last `DEVIATION_SAMPLES`.
     tick_us, tick_99_us : float
         CPU time of the last cycle, and what 99 % of the recent ones stayed below.
     """

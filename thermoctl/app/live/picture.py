@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import escape
 
+from rich.cells import cell_len
 from rich.color import Color
 from rich.style import Style
 from rich.text import Text
 
-from thermoctl.app.live.look import Look, Role
+from thermoctl.app.live.look import Look, Role, segments
 
 _CELL_WIDE, _CELL_HIGH = 8.4, 17.0
 _SIZE, _BASELINE = 14.0, 12.6
@@ -22,22 +23,6 @@ _DOT = 2.2
 _FONTS = "ui-monospace, 'DejaVu Sans Mono', Menlo, Consolas, monospace"
 _DOT_PLACES = ((0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (0, 3), (1, 3))
 """Column and row of each braille dot, in the order of its bit."""
-
-_Run = tuple[int, str, Style]
-
-
-def _runs(line: Text) -> Iterator[_Run]:
-    """Yield the pieces of one style in `line`: first cell, string, style."""
-    at = 0
-    ground = line.style if isinstance(line.style, Style) else Style()
-    for span in sorted(line.spans, key=lambda span: span.start):
-        if span.start > at:
-            yield at, line.plain[at : span.start], ground
-        style = span.style if isinstance(span.style, Style) else ground
-        yield span.start, line.plain[span.start : span.end], style
-        at = max(at, span.end)
-    if at < len(line.plain):
-        yield at, line.plain[at:], ground
 
 
 def _hex(colour: Color | None, default: str) -> str:
@@ -76,8 +61,11 @@ def _dots(string: str, left: float, top: float) -> str:
 
 def _line(line: Text, top: float, page: str) -> Iterator[str]:
     """Yield the elements of one row."""
-    for at, string, style in _runs(line):
+    at = 0
+    for string, style, _ in segments(line):
         left = _MARGIN + at * _CELL_WIDE
+        at += cell_len(string)
+        style = style or Style()
         ink, ground = _hex(style.color, "#D5DBE0"), _hex(style.bgcolor, page)
         if ground != page:
             yield (

@@ -12,10 +12,9 @@ from types import FrameType, TracebackType
 from typing import Any, Self, TextIO
 
 from rich.color import ColorSystem
-from rich.console import Console
 from rich.text import Text
 
-from thermoctl.app.live.look import Colour, Look, look_for
+from thermoctl.app.live.look import Colour, Look, look_for, segments
 from thermoctl.app.live.model import LiveModel
 from thermoctl.app.live.render import LEAST_HEIGHT, LEAST_WIDTH, render
 
@@ -29,7 +28,6 @@ _ENTER = "\x1b[?1049h\x1b[?25l\x1b[?7l"
 _LEAVE = "\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l"
 
 _SYSTEMS = {Colour.TRUE: ColorSystem.TRUECOLOR, Colour.ANSI: ColorSystem.STANDARD}
-_STYLES = Console(file=None, quiet=True)  # only asked what a style means; it never prints
 
 
 def terminal_codes(line: Text, colour: Colour) -> str:
@@ -38,7 +36,7 @@ def terminal_codes(line: Text, colour: Colour) -> str:
     system = _SYSTEMS.get(colour, ColorSystem.STANDARD)
     return "".join(
         segment.style.render(segment.text, color_system=system) if segment.style else segment.text
-        for segment in line.render(_STYLES)
+        for segment in segments(line)
     )
 
 
