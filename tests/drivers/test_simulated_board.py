@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from thermoctl_drivers.simulated import SimulatedBoard, SimulatedSettings
 
 from thermoctl.errors import BoardConfigError, LinkError, Refused
 from thermoctl.model.sensor import LM335, Sensor
 from thermoctl.ports import Board, Simulated
 from thermoctl.signals import Quality
+from thermoctl_drivers.simulated import SimulatedBoard, SimulatedSettings
 
 LM335_AT_5_V = Sensor(LM335, reference_v=5.0)
 SEED_OF_A_SLOW_ELEMENT = 2
@@ -242,6 +242,53 @@ def test_closing_switches_off_and_may_be_done_twice():
     board.open(clock.t_s)
     read(board, clock)
     assert board.truth()["energy_j"] == 0.0
+
+
+def test_opening_again_switches_off():
+    clock = HandClock()
+    board = board_on(clock)
+    write(board, clock, 1.0)
+    board.open(clock.t_s)
+    clock.t_s += 2.0
+    read(board, clock)
+    assert board.truth()["energy_j"] == 0.0
+
+
+def spread_k(**settings: object) -> float:
+    clock = HandClock()
+    board = board_on(clock, bits=16, ice_kg=0.0, ambient_c=25.0, **settings)
+    errors_k = []
+    for _ in range(300):
+        clock.t_s += 1.0
+        errors_k.append(read(board, clock).temperature_c - board.truth()["sensor_c"])
+    return float(np.std(errors_k))
+
+
+def test_single_conversions_see_the_pickup_that_a_burst_averages_out():
+    assert spread_k(conversions=1, noise_mv=0.0) > 0.1
+    assert spread_k(conversions=32, noise_mv=0.0) < 0.005
+
+
+def test_a_burst_covers_whole_periods_of_60_hertz_too():
+    assert spread_k(mains_hz=60.0, noise_mv=0.0, pickup_mv=30.0) < 0.02
+
+
+def test_noise_is_as_strong_as_it_was_set():
+    assert spread_k(conversions=1, noise_mv=5.0, pickup_mv=0.0) == pytest.approx(0.5, rel=0.1)
+
+
+@pytest.mark.parametrize("lag", ["element_lag_s", "transport_s", "sensor_lag_s"])
+def test_a_longer_lag_anywhere_makes_the_sensor_rise_later(lag):
+    risen_k = []
+    for lag_s in (3.0, 25.0):
+        clock = HandClock()
+        board = board_on(clock, **{lag: lag_s})
+        for _ in range(60):
+            write(board, clock, 1.0)
+            clock.t_s += 1.0
+        read(board, clock)
+        risen_k.append(board.truth()["sensor_c"])
+    assert risen_k[1] < risen_k[0] - 0.3
 
 
 def test_the_water_cools_while_the_board_is_closed():

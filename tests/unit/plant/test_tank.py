@@ -92,6 +92,43 @@ def test_mains_wander_by_a_percent():
     assert np.mean(seen) == pytest.approx(1.0, abs=0.003)
 
 
+def test_turbulence_makes_the_sensor_restless_by_what_the_sheath_lets_through():
+    probe = replace(CALM.probe, turbulence_k=0.1, turbulence_s=2.0, lag_s=6.0)
+    calm, restless = tank_of(seed=1), tank_of(replace(CALM, probe=probe), seed=1)
+    apart_k = []
+    for _ in range(4000):
+        for tank in (calm, restless):
+            tank.advance(0.5, 0.4)
+        apart_k.append(restless.sensor_c - calm.sensor_c)
+    passed_k = 0.1 * math.sqrt(2.0 / (2.0 + 6.0))  # coloured noise through a first-order lag
+    assert np.std(apart_k) == pytest.approx(passed_k, rel=0.1)
+
+
+def test_the_loss_to_the_bath_is_restless():
+    supply = replace(CALM.supply, loss_spread=0.05)
+    calm, restless = tank_of(), tank_of(replace(CALM, supply=supply))
+    for tank in (calm, restless):
+        tank.advance(600.0, 0.4)
+    assert 1e-3 < abs(restless.temperature_c - calm.temperature_c) < 1.0
+
+
+def test_an_uncalibrated_sensor_is_wrong_by_a_gain():
+    tank = tank_of(replace(CALM, probe=replace(CALM.probe, gain_error=0.01)))
+    assert tank.probe.volts() == pytest.approx(1.01 * tank_of().probe.volts())
+
+
+def test_a_draught_goes_on_when_the_stirrer_stops():
+    tank = tank_of()
+    disturb(tank, "draught", 5.0)
+    before = tank.heat
+    tank.advance(1.0, 0.0)
+    stirred_w = tank.heat.vapour_j - before.vapour_j
+    tank.stir(False)
+    before = tank.heat
+    tank.advance(1.0, 0.0)
+    assert tank.heat.vapour_j - before.vapour_j == pytest.approx(stirred_w, rel=0.05)
+
+
 def test_a_step_of_the_water_arrives_after_the_transport_and_then_by_the_lag_of_the_sheath():
     hot = tank_of(replace(CALM, initial_c=37.5))
     hot.pour(8.0, 10.0)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermoctl.plant import thermal
+from thermoctl.plant import handling, thermal
 from thermoctl.plant.parameters import (
     FUSION_J_PER_KG,
     WATER_J_PER_KG_K,
@@ -51,6 +51,23 @@ def test_dry_air_cools_water_of_room_temperature_by_evaporation_alone():
     assert rate.room_j == pytest.approx(0.0, abs=1e-9)
     latent = thermal.vaporisation_j_per_kg(25.0) + WATER_J_PER_KG_K * 25.0
     assert rate.vapour_j == pytest.approx(rate.vapour_kg * latent)
+
+
+def test_vapour_leaves_both_zones_at_the_temperature_they_have():
+    parameters = replace(IN_AIR, room=Room(temperature_c=25.0, humidity=0.3))
+    rate = rates(conductances(parameters), start(parameters), heater_w=0.0)
+    carried_w = Vessel().still_share * rate.water_kg * WATER_J_PER_KG_K * 25.0
+    assert rate.still_j == pytest.approx(carried_w)
+
+
+def test_half_the_water_wets_the_base_and_half_of_the_sides():
+    parameters = replace(TankParameters(), room=Room(temperature_c=25.0, humidity=1.0))
+    full = start(parameters)
+    half = handling.drain(full, parameters.vessel, 0.5)
+    lost_w = [rates(conductances(parameters), heat, 0.0).still_j for heat in (full, half)]
+    vessel = parameters.vessel
+    wetted_m2 = vessel.surface_m2 + 0.5 * vessel.side_m2
+    assert lost_w[1] / lost_w[0] == pytest.approx(wetted_m2 / vessel.glass_area_m2)
 
 
 def test_humid_warm_air_condenses_on_cold_water():
