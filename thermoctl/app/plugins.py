@@ -10,7 +10,7 @@ import dataclasses
 import difflib
 from collections.abc import Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, get_type_hints
+from typing import Any, get_origin, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -21,18 +21,43 @@ CONTROLLERS = "thermoctl.controllers"
 ESTIMATORS = "thermoctl.estimators"
 
 
+class BadOption(ConfigError):  # noqa: N818 - as its siblings in errors
+    """An option of a kind, or the kind itself, is wrong.
+
+    Parameters
+    ----------
+    text : str
+        What was expected and what came.
+    path : tuple of str
+        The key it stands under, from the table that is being built; empty when it is the whole.
+    """
+
+    def __init__(self, text: str, path: tuple[str, ...] = ()) -> None:
+        self.text, self.path = text, path
+        super().__init__(": ".join(part for part in (".".join(path), text) if part))
+
+
 def kinds(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of `group` by kind, in alphabetical order."""
     return {each.name: each for each in sorted(entry_points(group=group), key=lambda e: e.name)}
 
 
 def find(group: str, kind: str) -> Any:
-    """Return the class of `kind`; raise `ConfigError` naming the known ones if there is none."""
+    """Return the class of `kind`.
+
+    Raises
+    ------
+    BadOption
+        There is none, with the known ones; or the package that declares it cannot be imported.
+    """
     known = kinds(group)
+    what = group.rpartition(".")[2].removesuffix("s")
     if kind not in known:
-        what = group.rpartition(".")[2].removesuffix("s")
-        raise ConfigError(f"no {what} is called {kind!r}{nearest(kind, known)}")
-    return known[kind].load()
+        raise BadOption(f"no {what} is called {kind!r}{nearest(kind, known)}", ("kind",))
+    try:
+        return known[kind].load()
+    except (ImportError, AttributeError) as error:
+        raise BadOption(f"{what} {kind!r} cannot be loaded: {error}", ("kind",)) from error
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -58,22 +83,44 @@ def build(law: type, options: Mapping[str, Any], **injected: Any) -> Any:
 
     Raises
     ------
-    ConfigError
+    BadOption
         Naming the option, and what it should have been.
     """
     known = option_names(law, injected)
-    hints = get_type_hints(law)
-    accepted: dict[str, Any] = {}
-    for name, value in options.items():
-        if name not in known:
-            raise ConfigError(f"unknown key {name!r}{nearest(name, known)}")
-        try:
-            accepted[name] = TypeAdapter(
-                hints[name], config={"arbitrary_types_allowed": True}
-            ).validate_python(value)
-        except ValidationError as error:
-            raise ConfigError(f"{name}: {error.errors()[0]['msg']}, got {value!r}") from error
+    accepted = {name: _accepted(law, known, name, value) for name, value in options.items()}
+    for field in dataclasses.fields(law):
+        if field.name in known and field.name not in accepted and _is_required(field):
+            raise BadOption("is missing", (field.name,))
     try:
         return law(**accepted, **injected)
     except (TypeError, ValueError) as error:
-        raise ConfigError(str(error)) from error
+        raise blamed(error, known) from error
+
+
+def blamed(error: Exception, known: Iterable[str]) -> BadOption:
+    """Return `error` as a `BadOption` under the key its text begins with, if that is a known one.
+
+    The constructors of laws name their argument first: ``R2 must be positive, got -1``.
+    """
+    text = str(error)
+    first, _, rest = text.partition(" ")
+    return BadOption(rest, (first,)) if first in set(known) else BadOption(text)
+
+
+def _is_required(field: dataclasses.Field[Any]) -> bool:
+    return field.default is field.default_factory is dataclasses.MISSING
+
+
+def _accepted(law: type, known: Iterable[str], name: str, value: Any) -> Any:
+    """Return the option `name` of `law` when its type is right; a list becomes a tuple."""
+    if name not in known:
+        raise BadOption(f"unknown key{nearest(name, known)}", (name,))
+    hint = get_type_hints(law)[name]
+    given = tuple(value) if isinstance(value, list) and get_origin(hint) is tuple else value
+    try:
+        return TypeAdapter(hint, config={"arbitrary_types_allowed": True}).validate_python(
+            given, strict=True
+        )
+    except ValidationError as error:
+        message = error.errors()[0]["msg"].removeprefix("Input should be ")
+        raise BadOption(f"expected {message}, got {value!r}", (name,)) from error

@@ -6,23 +6,17 @@ Nothing here switches anything on: a configuration is read, checked as a whole a
 from __future__ import annotations
 
 import json
-import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any
 
-from pydantic import (
-    BaseModel,
-    Field,
-    SerializeAsAny,
-    ValidationError,
-    field_validator,
-    model_validator,
-)
+from pydantic import BaseModel, Field, SerializeAsAny, ValidationError
 
 from thermoctl.app import plugins
+from thermoctl.app.document import BadConfiguration, Document, KeyPath, Problem, read_document
+from thermoctl.app.parts import check_parts
 from thermoctl.app.tables import HistoryTable, LoopTable, ServiceTable, Table
-from thermoctl.app.toml_places import line_of, places
+from thermoctl.app.wording import reasons, shown, unknown_key, validated, without_unknown_keys
 from thermoctl.errors import ConfigError
 
 ETC = Path("/etc/thermoctl")
@@ -37,25 +31,6 @@ class Settings(Table):
     )
     history: HistoryTable = Field(default_factory=HistoryTable)
     service: ServiceTable = Field(default_factory=ServiceTable)
-
-    @field_validator("loops")
-    @classmethod
-    def _names_are_plain(cls, value: dict[str, LoopTable]) -> dict[str, LoopTable]:
-        for name in value:
-            if not name.replace("-", "_").isidentifier():
-                raise ValueError(f"a loop is named with letters, digits, - and _, got {name!r}")
-        return value
-
-    @model_validator(mode="after")
-    def _boards_that_loops_name_exist(self) -> Settings:
-        for name, loop in self.loops.items():
-            for part in (loop.sensor, loop.actuator):
-                if part is not None and part.board not in self.boards:
-                    raise ValueError(
-                        f"loop {name!r} names board {part.board!r}, but there is no such table"
-                        f"{plugins.nearest(part.board, self.boards)}"
-                    )
-        return self
 
     def loop(self, name: str | None = None) -> tuple[str, LoopTable]:
         """Return a loop with its name: the one called `name`, or the first."""
@@ -75,30 +50,17 @@ def load(source: str | Path | Mapping[str, Any]) -> Settings:
     Raises
     ------
     ConfigError
-        With file, line and key, what was expected and what came; for an unknown key, the nearest
-        known one.
+        `BadConfiguration`, with file, line, key, what was expected and what came for everything
+        that is wrong; for an unknown key, the nearest known one.
     """
     if isinstance(source, Mapping):
-        return _validated(dict(source), "configuration", "")
-    path = Path(source)
-    text = _text(path)
-    return _validated(_parsed(path, text), str(path), text)
+        return settings_in(Document(dict(source)))
+    return load_all([source])
 
 
 def load_all(paths: Iterable[str | Path]) -> Settings:
     """Return the settings of several files taken together; a name may stand in only one of them."""
-    merged: dict[str, Any] = {}
-    files = [Path(path) for path in paths]
-    if len(files) == 1:
-        return load(files[0])
-    for path in files:
-        for key, table in _parsed(path, _text(path)).items():
-            known = merged.setdefault(key, {})
-            twice = sorted(set(known) & set(table)) if isinstance(table, dict) else [key]
-            if twice:
-                raise ConfigError(f"{path}: {key}.{twice[0]} stands in an earlier file as well")
-            known.update(table)
-    return _validated(merged, ", ".join(map(str, files)), "")
+    return settings_in(read_document(Path(path) for path in paths))
 
 
 def default_files() -> list[Path]:
@@ -109,108 +71,105 @@ def default_files() -> list[Path]:
     return files
 
 
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise ConfigError(f"{path}: no such file") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(
-            f"{path}: expected a readable TOML file in UTF-8, got: {error}"
-        ) from error
+def settings_in(document: Document) -> Settings:
+    """Return the settings in `document`; raise `BadConfiguration` with all that is wrong."""
+    return _Reading(document).settings()
 
 
-def _parsed(path: Path, text: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: no valid TOML: {error}") from error
+class _Reading:
+    """One reading of a document, which goes on after an error so that all are told at once."""
 
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._problems: list[Problem] = []
 
-def _validated(content: dict[str, Any], source: str, text: str) -> Settings:
-    found = places(text)
+    def settings(self) -> Settings:
+        content = self._document.content
+        for key in content:
+            if key not in Settings.model_fields:
+                self._blame((key,), unknown_key(key, Settings.model_fields))
+        tables: dict[str, Any] = {"boards": self._boards(), "loops": self._loops()}
+        for key, model in (("history", HistoryTable), ("service", ServiceTable)):
+            tables[key] = self._table(model, content.get(key, {}), (key,))
+        if self._problems:
+            raise BadConfiguration(self._problems)
+        return Settings.model_validate(tables)
 
-    def where(path: tuple[str, ...]) -> str:
-        line = line_of(found, path)
-        return f"{source}:{line}: " if line else f"{source}: "
+    def _boards(self) -> dict[str, BaseModel | None]:
+        """Return each board's settings by the model of its kind."""
+        boards: dict[str, BaseModel | None] = {}
+        for name, table in self._named("boards"):
+            kind = table.get("kind")
+            known = plugins.kinds(plugins.DRIVERS)
+            if kind is None:
+                self._blame(("boards", name), f"needs a kind; known: {', '.join(known)}")
+                continue
+            try:
+                model = plugins.find(plugins.DRIVERS, str(kind)).Settings
+            except plugins.BadOption as error:
+                self._blame(("boards", name, *error.path), error.text)
+                continue
+            boards[name] = self._table(model, table, ("boards", name))
+        return boards
 
-    boards, lines = _boards(content.get("boards", {}), where)
-    try:
-        settings = Settings.model_validate({**content, "boards": boards})
-    except ValidationError as error:
-        lines += _explain(error, Settings, (), where)
-    if lines:
-        raise ConfigError("\n".join(dict.fromkeys(lines)))
-    return settings
+    def _loops(self) -> dict[str, BaseModel | None]:
+        """Return each loop's table, its laws and channels tried out and its boards looked up."""
+        loops: dict[str, BaseModel | None] = {}
+        for name, table in self._named("loops"):
+            self._board_names(name, table)
+            loop = loops[name] = self._table(LoopTable, table, ("loops", name))
+            if not name.replace("-", "_").isidentifier():
+                self._blame(("loops", name), "a loop is named with letters, digits, - and _")
+            if isinstance(loop, LoopTable):
+                try:
+                    check_parts(loop)
+                except plugins.BadOption as error:
+                    self._blame(("loops", name, *error.path), error.text)
+        if not loops and not self._problems:
+            self._blame(("loops",), "expected at least one table [loops.NAME], got none")
+        return loops
 
+    def _board_names(self, loop: str, table: Mapping[str, Any]) -> None:
+        """Blame a channel whose board has no table; a board that is bad is blamed for itself."""
+        boards = self._document.content.get("boards", {})
+        for part in ("sensor", "actuator"):
+            channel = table.get(part)
+            board = channel.get("board") if isinstance(channel, Mapping) else None
+            if isinstance(board, str) and board not in boards:
+                hint = plugins.nearest(board, boards)
+                self._blame(
+                    ("loops", loop, part, "board"), f"no table [boards.{board}] there{hint}"
+                )
 
-Where = Callable[[tuple[str, ...]], str]
+    def _named(self, key: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+        """Yield name and content of the tables below `key`."""
+        tables = self._document.content.get(key, {})
+        if not isinstance(tables, Mapping):
+            self._blame((key,), f"expected tables [{key}.NAME], got {shown(tables)}")
+            return
+        for name, table in tables.items():
+            if isinstance(table, Mapping):
+                yield str(name), table
+            else:
+                self._blame((key, str(name)), f"expected a table, got {shown(table)}")
 
-
-def _boards(tables: Any, where: Where) -> tuple[dict[str, BaseModel], list[str]]:
-    """Return each board's settings by the model of its kind, and a line for each that is bad."""
-    boards: dict[str, BaseModel] = {}
-    lines: list[str] = []
-    if not isinstance(tables, Mapping):
-        return {}, [f"{where(('boards',))}expected tables [boards.NAME], got {tables!r}"]
-    for name, table in tables.items():
-        path = ("boards", str(name))
-        kind = table.get("kind") if isinstance(table, Mapping) else None
-        boards[name] = Table()  # so that a loop that names it is not reproached as well
-        if not isinstance(kind, str):
-            known = ", ".join(plugins.kinds(plugins.DRIVERS))
-            lines.append(f"{where(path)}{'.'.join(path)} needs a kind; known: {known}")
-            continue
+    def _table(self, model: type[BaseModel], table: Any, path: KeyPath) -> BaseModel | None:
+        """Return `table` as a `model`; None, and all its errors blamed, if it is none."""
         try:
-            model = plugins.find(plugins.DRIVERS, kind).Settings
-            boards[name] = model.model_validate(table)
+            return validated(model, table)
         except ValidationError as error:
-            lines += _explain(error, model, path, where)
-        except ConfigError as error:
-            lines.append(f"{where((*path, 'kind'))}{'.'.join(path)}: {error}")
-    return boards, lines
+            self._explain(error, model, path)
+            pruned = without_unknown_keys(error, table)
+        if pruned != table:  # limits that contradict each other show only in a table without typos
+            try:
+                validated(model, pruned)
+            except ValidationError as error:
+                self._explain(error, model, path)
+        return None
 
+    def _explain(self, error: ValidationError, model: type[BaseModel], path: KeyPath) -> None:
+        for below, text in reasons(error, model):
+            self._blame(path + below, text)
 
-def _explain(
-    error: ValidationError, model: Any, prefix: tuple[str, ...], where: Where
-) -> list[str]:
-    """Return one line an error: file, line, key, what was expected and what came."""
-    lines = []
-    for each in error.errors():
-        below = tuple(str(part) for part in each["loc"])
-        path = prefix + below
-        lines.append(f"{where(path)}{_sentence(each, path, _known_keys(model, below[:-1]))}")
-    return lines
-
-
-def _sentence(each: Any, path: tuple[str, ...], known: list[str]) -> str:
-    key = ".".join(path)
-    if each["type"] == "extra_forbidden":
-        return f"unknown key {key!r}{plugins.nearest(path[-1], known)}"
-    if each["type"] == "missing":
-        return f"{key} is missing"
-    message = each["msg"].removeprefix("Value error, ")
-    if each["type"] == "value_error":
-        return f"{key}: {message}" if key else message
-    return f"{key}: {message[0].lower()}{message[1:]}, got {each['input']!r}"
-
-
-def _known_keys(model: Any, path: tuple[str, ...]) -> list[str]:
-    """Return the keys of the table at `path` below `model`, by walking the annotations."""
-    annotation: Any = model
-    for part in path:
-        inner = _tables_in(annotation)
-        if get_origin(annotation) is dict or inner is None:
-            annotation = inner  # `part` is the name of one of many tables
-        else:
-            field = inner.model_fields.get(part)
-            annotation = None if field is None else field.annotation
-    inner = _tables_in(annotation)
-    return sorted(inner.model_fields) if inner is not None else []
-
-
-def _tables_in(annotation: Any) -> type[BaseModel] | None:
-    """Return the model inside an annotation such as ``dict[str, Model]`` or ``Model | None``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((found for each in get_args(annotation) if (found := _tables_in(each))), None)
+    def _blame(self, key: KeyPath, text: str) -> None:
+        self._problems.append(self._document.problem(key, text))

@@ -19,13 +19,15 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 class Table(BaseModel):
     """A table whose keys are all known; frozen once it is read."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, validate_default=True, allow_inf_nan=False
+    )
 
 
 class Options(BaseModel):
     """A table that names a ``kind``; its other keys are the options of that kind."""
 
-    model_config = ConfigDict(extra="allow", frozen=True)
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
     kind: str = Field(description="Which one; `thermoctl drivers` and the manual list them.")
 
@@ -81,8 +83,8 @@ class GuardsTable(Table):
     enabled: bool = Field(True, description="False: the bare law, as printed.")
     covariance_max: Positive | None = Field(
         None,
-        description="Cap on the diagonal of P; when absent P0 for structure arx, and for known-gain the "
-        "square of gain over set point.",
+        description="Cap on the diagonal of P; when absent P0 for structure arx, and for "
+        "known-gain the square of gain over set point.",
     )
     excitation_min: Positive | None = Field(
         None,

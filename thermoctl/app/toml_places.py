@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import re
 
-_HEADER = re.compile(r"^\s*\[+\s*(?P<path>[^\[\]]+?)\s*\]+\s*(#.*)?$")
-_KEY = re.compile(r"^\s*(?P<path>[A-Za-z0-9_\-\"'.]+)\s*=")
+_PART = r"(?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')"
+_PATH = rf"(?P<path>{_PART}(?:\s*\.\s*{_PART})*)"
+_HEADER = re.compile(rf"^\s*\[\[?\s*{_PATH}\s*\]\]?\s*(#.*)?$")
+_KEY = re.compile(rf"^\s*{_PATH}\s*=")
+_LONG_STRING = re.compile(r"\"\"\"|'''")
 
 Path = tuple[str, ...]
 
@@ -18,7 +21,13 @@ def places(text: str) -> dict[Path, int]:
     """Return the line number, from 1, of every table and key of `text` by its path."""
     found: dict[Path, int] = {}
     table: Path = ()
+    closing = ""  # the quotes that end a string over several lines, while inside one
     for number, line in enumerate(text.splitlines(), 1):
+        inside = closing
+        for quotes in _LONG_STRING.findall(line):
+            closing = {"": quotes, quotes: ""}.get(closing, closing)
+        if inside:
+            continue
         if header := _HEADER.match(line):
             table = _split(header["path"])
             found.setdefault(table, number)
@@ -37,4 +46,4 @@ def line_of(found: dict[Path, int], path: Path) -> int | None:
 
 
 def _split(path: str) -> Path:
-    return tuple(part.strip().strip("\"'") for part in path.split("."))
+    return tuple(part.strip("\"'") for part in re.findall(_PART, path))

@@ -1,0 +1,176 @@
+"""From the tables of a loop to the parts they describe: limits, model, laws, sensor, actuator.
+
+Pure: nothing is opened and no clock is read, so a configuration is tried out by building it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import BaseModel
+
+from thermoctl.app import plugins
+from thermoctl.app.plugins import BadOption
+from thermoctl.app.tables import ActuatorTable, EstimatorTable, LoopTable, ModelTable, SensorTable
+from thermoctl.estimation import Guarded, Identifier, RandomWalkKalman
+from thermoctl.estimation.kalman import CorrectedKalman
+from thermoctl.model import actuator as laws
+from thermoctl.model import sensor as curves
+from thermoctl.model.arx import Arx, KnownGain
+from thermoctl.ports import Controller, Estimator
+from thermoctl.regulator import Limits, Plan
+
+_ARX_EXCITATION_MIN = 0.1
+
+
+def plan_for(table: LoopTable) -> Plan:
+    """Return the parts of a loop's regulator, each checked.
+
+    Raises
+    ------
+    BadOption
+        An option of a law is unknown or bad; its path begins below the loop.
+    """
+    with _within("model", table.model):
+        structure = _structure(table.model, table.period_s)
+    with _within("estimator", table.estimator):
+        identifier = _identifier(table.estimator, structure, table.setpoint_c)
+    with _within("controller", table.controller):
+        controller = _controller(table, structure)
+    with _within("", table):
+        return Plan(_limits(table), identifier, controller, table.setpoint_c, table.mode)
+
+
+def check_parts(table: LoopTable) -> None:
+    """Build every part of a loop once; raise `BadOption` where a table does not describe one."""
+    plan_for(table)
+    if table.sensor is not None:
+        sensor_for(table.sensor)
+    if table.actuator is not None:
+        law_for(table.actuator)
+
+
+@contextlib.contextmanager
+def _within(name: str, table: BaseModel) -> Iterator[None]:
+    """Say of an error from which table it came, and under which of its keys."""
+    above = (name,) if name else ()
+    try:
+        yield
+    except BadOption as error:
+        raise BadOption(error.text, above + error.path) from error
+    except ValueError as error:
+        blamed = plugins.blamed(error, type(table).model_fields)
+        raise BadOption(blamed.text, above + blamed.path) from error
+
+
+def _limits(table: LoopTable) -> Limits:
+    low_c, high_c = table.setpoint_range_c
+    return Limits(
+        trip_above_c=table.trip_above_c,
+        trip_below_c=table.trip_below_c,
+        setpoint_min_c=low_c,
+        setpoint_max_c=high_c,
+        period_s=table.period_s,
+        power_max=table.power_max,
+        rise_per_s=table.rise_limit_per_s,
+        jump_k=table.jump_k,
+    )
+
+
+def _structure(table: ModelTable, period_s: float) -> Arx | KnownGain:
+    if table.structure == "known-gain":
+        return KnownGain(table.gain_k_per_s * period_s)
+    return Arx(table.n, table.m, y_centre_c=table.centre_c, y_scale_k=table.scale_k)
+
+
+def _identifier(table: EstimatorTable, structure: Arx | KnownGain, setpoint_c: float) -> Identifier:
+    law = plugins.build(plugins.find(plugins.ESTIMATORS, table.kind), table.options)
+    theta0 = table.theta0
+    if theta0 is None and isinstance(structure, KnownGain):
+        theta0 = (1.0,)  # a plant without loss keeps its temperature
+    return Identifier(structure, _guarded(law, table, structure, setpoint_c), theta0, table.P0)
+
+
+def _guarded(
+    law: Estimator, table: EstimatorTable, structure: Arx | KnownGain, setpoint_c: float
+) -> Estimator:
+    guards = table.guards
+    if not guards.enabled:
+        return law
+    excitation_min = guards.excitation_min
+    if excitation_min is None and isinstance(structure, Arx):
+        excitation_min = _ARX_EXCITATION_MIN
+    kalman = isinstance(law, RandomWalkKalman | CorrectedKalman)
+    too_simple = isinstance(structure, KnownGain)  # its innovations are lag as much as noise
+    return Guarded(
+        law,  # type: ignore[arg-type]
+        covariance_max=guards.covariance_max or _covariance_max(table, structure, setpoint_c),
+        excitation_min=excitation_min,
+        robust_R2=guards.robust_R2 and kalman,
+        R2_min=getattr(law, "R2", None) if too_simple else None,
+    )
+
+
+def _covariance_max(table: EstimatorTable, structure: Arx | KnownGain, setpoint_c: float) -> float:
+    """Return the cap on P when none is set: P0, or for a known gain what physics allows.
+
+    A loss, (1 - a) times the temperature, that is less certain than the heater's full power would
+    make no sense; a noisy converter would otherwise keep the pole jumping.
+    """
+    if isinstance(structure, Arx):
+        return table.P0
+    return min(table.P0, (structure.b_k / max(abs(setpoint_c), 1.0)) ** 2)
+
+
+def _controller(table: LoopTable, structure: Arx | KnownGain) -> Controller:
+    law = plugins.find(plugins.CONTROLLERS, table.controller.kind)
+    takes_structure = "structure" in plugins.option_names(law)
+    injected: dict[str, Any] = {"structure": structure} if takes_structure else {}
+    controller: Controller = plugins.build(law, table.controller.options, **injected)
+    return controller
+
+
+def sensor_for(table: SensorTable) -> curves.Sensor:
+    """Return the sensor a table describes; raise `BadOption` if it describes none."""
+    with _within("sensor", table):
+        return curves.Sensor(
+            _conversion(table),
+            table.reference_v,
+            table.open_above,
+            table.short_below,
+            curves.Calibration(table.calibration_gain, table.calibration_offset_k),
+        )
+
+
+def _conversion(table: SensorTable) -> curves.Conversion:
+    match table.curve:
+        case "lm335":
+            return curves.LM335
+        case "lm35":
+            return curves.LM35
+        case "tmp36":
+            return curves.TMP36
+        case "linear":
+            return curves.LinearConversion(table.kelvin_per_v, table.zero_v_c)
+        case "ntc":
+            resistance: curves.ResistanceCurve = curves.Beta(table.r25_ohm, table.beta_k)
+        case _:
+            resistance = curves.Platinum(1000.0 if table.curve == "pt1000" else 100.0)
+    supply_v = table.reference_v if table.supply_v is None else table.supply_v
+    return curves.PullUp(resistance, table.pull_up_ohm or math.nan, supply_v)
+
+
+def law_for(table: ActuatorTable) -> laws.ActuatorLaw:
+    """Return the law from power to the drive the output takes."""
+    match table.law:
+        case "linear":
+            return laws.Linear()
+        case "square":
+            return laws.SquareLaw()
+        case "phase-angle":
+            return laws.PhaseAngle()
+        case _:
+            return laws.WholeCycleBurst(table.cycles)
