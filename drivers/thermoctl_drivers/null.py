@@ -62,11 +62,11 @@ class NullBoard:
 
     Settings: ClassVar[type[NullSettings]] = NullSettings
     transport: ClassVar[str] = "none"
+    # What gives no power has no power to cut.
+    capabilities: Capabilities = Capabilities(dead_man=True)
 
     def __init__(self, settings: NullSettings, link: Link | None, clock: Clock) -> None:
         del link  # every driver is built alike
-        # What gives no power has no power to cut.
-        self.capabilities = Capabilities(dead_man=True)
         self._settings, self._clock = settings, clock
         self._reading: float | None = settings.reading
         self._is_open = False

@@ -91,9 +91,9 @@ class ThermoDaq:
 
     Settings: ClassVar[type[ThermoDaqSettings]] = ThermoDaqSettings
     transport: ClassVar[str] = "serial"
+    capabilities: Capabilities = Capabilities(dead_man=True, readback=True)
 
     def __init__(self, settings: ThermoDaqSettings, link: Link, clock: Clock) -> None:
-        self.capabilities = Capabilities(dead_man=True, readback=True)
         self._settings, self._link, self._clock = settings, link, clock
         self._exchange = Exchange(link, clock)
         self._counters: Counter[str] = Counter()
