@@ -132,7 +132,7 @@ class Acquisition:
         return int(seen_v.sum())
 
     def _next_noise(self) -> Array:
-        """Return white noise for one burst; drawn in blocks, which is five times cheaper."""
+        """Return white noise for one burst; drawn in blocks, at less than half the price."""
         if self._row == len(self._noise_v):
             shape = (BLOCK_BURSTS, self._parameters.conversions)
             self._noise_v = self._rng.standard_normal(shape) * self._parameters.noise_v

@@ -14,7 +14,7 @@ BLOCK = 512
 
 
 class Normals:
-    """Standard normal numbers one at a time, for a tenth of the price of single draws."""
+    """Standard normal numbers one at a time, for a twentieth of the price of single draws."""
 
     __slots__ = ("_block", "_rng")
 
