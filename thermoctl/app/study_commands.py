@@ -200,7 +200,7 @@ def experiment_command(
     require_matplotlib()
     title, stem = "The law of O21, equation (27), as printed", "experiment"
     if reference_time_s is not None:
-        title = f"The law of O21, approaching the set point with {reference_time_s:g} s"
+        title = f"The law of O21 with a reference time constant of {reference_time_s:g} s"
         stem = f"experiment-tc{reference_time_s:g}"
     files = [out / f"{stem}{kind}" for kind in FORMATS]
     run = _simulated(reference_time_s, duration_s, seed)

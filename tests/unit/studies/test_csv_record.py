@@ -107,6 +107,11 @@ def test_dates_become_seconds_whatever_their_offset(write):
     assert any("'yesterday', neither seconds nor ISO 8601" in note for note in record.notes)
 
 
+def test_a_date_without_an_offset_is_utc(write):
+    content = "t,u,y\n2026-03-01T12:00:00,0,20\n2026-03-01T13:00:05+01:00,0,21\n"
+    assert read_csv(write(content), NAMED).t_s.tolist() == [0, 5]
+
+
 @pytest.mark.parametrize("role", ["output", "input", "time"])
 def test_a_missing_column_is_answered_with_those_that_are_there(write, role):
     wanted = Columns(**{"output": "y", "input": "u", "time": "t", role: "nope"})
