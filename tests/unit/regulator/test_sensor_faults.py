@@ -1,0 +1,159 @@
+"""What a bad reading does to the heater, and how soon; times are printed as they are measured."""
+
+import math
+
+import pytest
+
+from thermoctl.signals import Acknowledge, Measurement, Mode, Quality, State
+
+
+@pytest.mark.parametrize("quality", [Quality.OPEN, Quality.SHORT])
+def test_a_broken_sensor_circuit_cuts_the_heater_at_once(warm, quality):
+    seconds = warm.seconds_to_power_0(quality)
+    print(f"sensor {quality}: power 0 after {seconds} s")
+    assert seconds <= 2
+    assert warm.steps[-1].state is State.SAFE
+
+
+def test_safe_returns_to_run_after_thirty_seconds_of_good_readings_and_not_before(warm):
+    warm.run(5, Quality.SHORT)
+    assert {step.state for step in (warm.step() for _ in range(30))} == {State.SAFE}
+    assert warm.step().state is State.RUN
+    assert warm.run(60).command.power > 0.0
+
+
+def test_one_bad_reading_begins_the_thirty_seconds_anew(warm):
+    warm.run(5, Quality.SHORT)
+    warm.run(25)
+    warm.step(Quality.MISSING)
+    assert warm.run(29).state is State.SAFE
+
+
+def test_an_open_circuit_three_times_in_ten_minutes_latches(warm):
+    for _ in range(2):
+        warm.run(2, Quality.OPEN)
+        assert warm.run(60).state is State.RUN
+    warm.step(Quality.OPEN)
+    latched = warm.run(200)
+    assert latched.state is State.LATCHED
+    assert latched.command.power == 0.0
+    assert [alarm.code for alarm in latched.alarms if alarm.latched] == ["sensor.open"]
+
+
+def test_an_open_circuit_three_times_in_half_an_hour_does_not_latch(warm):
+    for _ in range(3):
+        warm.run(2, Quality.OPEN)
+        warm.run(600)
+    assert warm.steps[-1].state is State.RUN
+
+
+def test_a_missing_sample_is_ridden_on_the_model_at_most_at_holding_power(warm):
+    holding = warm.steps[-1].beliefs.holding_power
+    ridden = warm.step(Quality.MISSING)
+    assert ridden.state is State.RIDE
+    assert 0.0 < ridden.command.power <= holding
+
+
+def test_a_ride_alarms_after_five_seconds_and_ends_safe_within_a_minute(warm):
+    assert not warm.run(4, Quality.MISSING).alarms
+    alarmed = warm.run(2, Quality.MISSING)
+    assert [alarm.code for alarm in alarmed.alarms] == ["sensor.missing"]
+    seconds = 6 + warm.seconds_to_power_0(Quality.MISSING)
+    print(f"sensor missing, model known: power 0 after {seconds} s")
+    assert seconds <= 60
+    assert warm.steps[-1].state is State.SAFE
+
+
+def test_before_a_model_is_known_the_last_output_is_held_for_three_seconds(drive_with):
+    cold = drive_with(water_c=25.0)
+    assert cold.run(20).command.power == 1.0
+    assert cold.step(Quality.MISSING).state is State.HOLD
+    seconds = 1 + cold.seconds_to_power_0(Quality.MISSING)
+    print(f"sensor missing, model unknown: power 0 after {seconds} s")
+    assert seconds <= 3
+
+
+def test_a_sensor_that_never_answers_never_gets_heat(drive_with):
+    drive = drive_with(water_c=20.0)
+    drive.run(100, Quality.MISSING)
+    assert {step.command.power for step in drive.steps} == {0.0}
+    assert drive.steps[-1].state is State.SAFE
+
+
+def test_time_that_stands_still_does_not_stop_the_patience_with_a_lost_sensor(drive_with):
+    cold = drive_with(water_c=25.0)
+    cold.run(20)
+    stuck = [cold.see(Measurement(cold.t_s, math.nan, Quality.MISSING)) for _ in range(5)]
+    assert stuck[-1].state is State.SAFE
+
+
+@pytest.mark.parametrize("spike_k", [50.0, -50.0, 20.0, -20.0])
+def test_one_spike_is_ignored_counted_and_hardly_moves_the_output(drive_with, spike_k):
+    drive = drive_with(trip_above_c=95.0)
+    before = drive.run(300).command.power
+    spiked = drive.step(offset_k=spike_k)
+    after = drive.step()
+    assert [event.name for event in spiked.events if event.name == "sensor.spike"]
+    assert abs(spiked.command.power - before) <= 0.05
+    assert abs(after.command.power - before) <= 0.05
+    assert after.state is State.RUN
+
+
+def test_a_jump_of_the_water_is_believed_when_it_repeats(warm):
+    warm.water_c -= 5.0
+    states = [warm.step().state for _ in range(3)]
+    assert states == [State.HOLD, State.HOLD, State.RUN]
+    assert warm.power > 0.5
+
+
+def test_a_spike_across_the_hard_limit_costs_one_cycle_of_power_and_no_latch(warm):
+    spiked = warm.step(offset_k=40.0)
+    assert spiked.command.power == 0.0
+    assert spiked.command.reason == "trip.over_temperature"
+    after = warm.step()
+    assert after.state is State.RUN
+    assert after.command.power > 0.0
+
+
+def test_over_temperature_latches_when_the_second_reading_confirms_it(warm):
+    first = warm.step(offset_k=30.0)
+    second = warm.step(offset_k=30.0)
+    assert (first.command.power, second.command.power) == (0.0, 0.0)
+    assert second.state is State.LATCHED
+    assert warm.run(1000).state is State.LATCHED
+
+
+def test_a_missing_reading_between_two_hot_ones_gives_no_heat(warm):
+    warm.step(offset_k=30.0)
+    assert warm.step(Quality.MISSING).command.power == 0.0
+    assert warm.step(offset_k=30.0).state is State.LATCHED
+
+
+def test_a_stale_reading_above_the_limit_is_believed(warm):
+    assert warm.see(Measurement(warm.t_s + 1.0, 70.0, Quality.STALE)).command.power == 0.0
+
+
+def test_only_an_acknowledgement_clears_a_latch_and_only_when_its_cause_is_gone(warm):
+    warm.step(offset_k=30.0)
+    warm.step(offset_k=30.0)
+    with pytest.raises(ValueError, match="still stands"):
+        warm.regulator.request(Acknowledge())
+    assert warm.run(100).state is State.LATCHED
+    warm.regulator.request(Acknowledge())
+    assert warm.run(40).state is State.RUN
+    assert warm.steps[-1].alarms == ()
+
+
+@pytest.mark.parametrize("mode", [Mode.OFF, Mode.MANUAL, Mode.AUTO])
+def test_every_mode_is_supervised(warm, mode):
+    warm.regulator.request(mode)
+    warm.run(10)
+    warm.step(offset_k=30.0)
+    assert warm.step(offset_k=30.0).state is State.LATCHED
+    assert warm.run(5).command.power == 0.0
+
+
+def test_manual_power_ends_too_when_the_sensor_is_lost(warm):
+    warm.regulator.request(Mode.MANUAL)
+    assert warm.run(10).command.power > 0.0
+    assert warm.seconds_to_power_0(Quality.MISSING) <= 3
