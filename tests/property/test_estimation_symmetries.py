@@ -102,8 +102,10 @@ def test_a_change_of_the_unit_of_y_scales_theta_alone_in_least_squares(seed, n, 
 def test_a_batch_equals_a_loop_over_its_replications_gaps_included(seed, n):
     rng = np.random.default_rng(seed)
     T, R = 40, 5
-    y, phi = 3.0 * rng.normal(size=(T, R)), rng.normal(size=(T, R, n))
+    phi = rng.normal(size=(T, R, n))
+    y = phi @ rng.normal(size=n) + rng.normal(size=(T, R))
     y[7, 2], phi[11, 3, n - 1], y[0, 4], phi[20, 0, 0] = np.nan, np.inf, 1e200, np.nan
+    phi[30, 1] = 1e60
     P0, theta0, R1 = covariance(rng, n), rng.normal(size=n), 0.01 * covariance(rng, n)
     for law in laws(R1, 0.5):
         batch = run_batch(law, y, phi, P0, theta0)

@@ -73,7 +73,8 @@ class SelfTuningMinimumVariance:
             value = getattr(self, name)
             if not is_finite_number(value) or value < 0.0:
                 raise ValueError(f"{name} must be finite and at least 0, got {value!r}")
-        if not self.zero_radius > 0.0:
+        limited = is_finite_number(self.zero_radius) and self.zero_radius > 0.0
+        if not limited and self.zero_radius != math.inf:
             raise ValueError(f"zero_radius must be positive, got {self.zero_radius!r}")
 
     def start(self) -> None:

@@ -1,6 +1,6 @@
 """How a belief begins, and the checks every constructor of this room shares.
 
-Implements sections 2 and 6 of ``docs/theory.md``.
+Implements section 2 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from thermoctl.estimation.belief import positive
 from thermoctl.estimation.recursion import Arithmetic, RecursiveLaw, V, checked_drift
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, is_finite_number
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +76,8 @@ class CorrectedKalman(RecursiveLaw):
     def __post_init__(self) -> None:
         object.__setattr__(self, "R1", checked_drift(self.R1))
         positive("R2", self.R2)
-        if not self.inflation_max >= 1.0:  # written so that NaN fails too
+        limited = is_finite_number(self.inflation_max) and self.inflation_max >= 1.0
+        if not limited and self.inflation_max != math.inf:
             raise ValueError(f"inflation_max must be at least 1, got {self.inflation_max!r}")
 
     def weigh(self, q: V, e: V, n: int, arithmetic: Arithmetic[V]) -> tuple[V, V | float]:

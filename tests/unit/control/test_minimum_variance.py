@@ -236,7 +236,7 @@ def test_it_may_steer_without_a_sensor_for_three_lags_up_to_a_minute(reference_t
             for v in (-1.0, math.nan, math.inf)
         ),
         *((ValueError, "gain_min_k", {"gain_min_k": v}) for v in (-1.0, math.nan, math.inf)),
-        *((ValueError, "zero_radius", {"zero_radius": v}) for v in (0.0, -1.0, math.nan)),
+        *((ValueError, "zero_radius", {"zero_radius": v}) for v in (0.0, -1.0, math.nan, None)),
     ],
 )
 def test_a_constructor_names_the_argument_that_is_wrong(error, name, arguments):

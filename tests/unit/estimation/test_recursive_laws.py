@@ -273,7 +273,7 @@ def test_a_drift_of_another_size_than_the_belief_is_named():
         ("R1", lambda: CorrectedKalman(R1=np.diag([1.0, math.nan]))),
         *(
             ("inflation_max", lambda v=v: CorrectedKalman(inflation_max=v))
-            for v in (0.9, math.nan, -math.inf)
+            for v in (0.9, math.nan, -math.inf, None)
         ),
         *(("n", lambda v=v: start(v)) for v in (0, -1, 1.5, True)),
         *(
