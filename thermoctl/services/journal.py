@@ -18,8 +18,6 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any, Final, NoReturn
 
-import structlog
-
 from thermoctl.services.events import PRIORITIES, level_of
 from thermoctl.services.feed import Feed
 from thermoctl.services.plain import as_json, plain_text
@@ -78,10 +76,14 @@ class Journal:
         fields = dict(event_dict)
         name, loop = str(fields.pop("event", "")), fields.pop("loop", None)
         self._put(method if method in PRIORITIES else "info", name, loop, fields)
-        raise structlog.DropEvent
+        from structlog import DropEvent
+
+        raise DropEvent
 
     def configure(self) -> None:
         """Make this journal the end of every structlog logger of the process."""
+        import structlog  # see human_sink
+
         structlog.configure(processors=[self.processor], cache_logger_on_first_use=False)
 
     @property
@@ -151,6 +153,9 @@ def sink_for(
 
 def human_sink(descriptor: int, colors: bool) -> Sink:
     """Return a sink that writes lines for people, as structlog draws them."""
+    # 12 MB with the terminal libraries it brings: a daemon without a terminal stays without it.
+    import structlog
+
     render = structlog.dev.ConsoleRenderer(
         colors=colors, force_colors=colors, pad_event_to=22, sort_keys=False
     )
