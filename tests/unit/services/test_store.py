@@ -159,6 +159,15 @@ def test_a_record_of_last_hour_survives_a_clock_set_back(tmp_path, wall_clock):
     assert store.load("tank") == (RunRecord(Mode.MANUAL, 20.0), None)
 
 
+def test_a_record_from_the_future_is_ignored(tmp_path, wall_clock):
+    store = RunStore(tmp_path, wall_clock)
+    store.save("tank", RunRecord(Mode.AUTO, 41.0))
+    wall_clock.utc_s -= 31_536_000.0
+    record, warning = store.load("tank")
+    assert record is None
+    assert "future" in (warning or "")
+
+
 def test_what_is_no_json_leaves_the_old_document(tmp_path, wall_clock):
     store = StateStore(tmp_path, wall_clock)
     store.write("x", {"value": 1})
