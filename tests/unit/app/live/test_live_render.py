@@ -211,6 +211,16 @@ def test_alarms_have_a_shape_and_a_word_even_in_little_room(
     assert said in texts(model.view(0.0), 80, 24)[1]
 
 
+def test_a_belief_makes_room_for_an_alarm(model: LiveModel, make_cycle: MakeCycle) -> None:
+    sure, gone = Beliefs(holding_power=1.0), Alarm("a", None, 2, 0.0, "", active=False)
+    model.feed(make_cycle(0.0, 12.34, accepted_power=1.0, beliefs=sure))
+    assert "holds with 100 %" in texts(model.view(0.0), 80, 24)[1]
+    model.feed(make_cycle(1.0, 12.34, accepted_power=1.0, beliefs=sure, alarms=(gone,)))
+    values = texts(model.view(1.0), 80, 24)[1]
+    assert values.endswith("△ 1 to ack")
+    assert "holds" not in values
+
+
 def test_an_alarm_that_is_gone_and_acknowledged_is_quiet(
     model: LiveModel, make_cycle: MakeCycle
 ) -> None:
