@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 
 from thermoctl.studies.experiment import Measures
@@ -61,9 +62,8 @@ def print_replay(console: Console, result: Replay) -> None:
     """Print what was read, what was done to it, and how every law did."""
     for line in (*_about_record(result.record), *_about_conditions(result)):
         console.print(line, style="none", markup=False, soft_wrap=True)
-    for table in (_prediction_table(result), _parameter_table(result)):
-        console.print()
-        console.print(table)
+    _print_table(console, _prediction_table(result))
+    _print_table(console, *_parameter_tables(result))
     console.print()
     for line in _warnings(result):
         console.print(line, markup=False, soft_wrap=True)
@@ -126,13 +126,35 @@ def _figure(value: float, form: str) -> str:
     return f"{value:{'.2e' if large else form}}".replace("-", "−")
 
 
-def _parameter_table(result: Replay) -> Table:
-    """Return the last parameters of each law."""
-    table = _table("parameters ± 2σ", *parameter_names(result.conditions.order))
-    for score in result.scores:
-        pairs = zip(score.theta, score.theta_sd, strict=True)
-        table.add_row(score.name, *(number(value, sd) for value, sd in pairs))
-    return table
+def _parameter_tables(result: Replay) -> tuple[Table, Table]:
+    """Return the last parameters of each law: a row for each law, or one for each parameter."""
+    names = parameter_names(result.conditions.order)
+    cells = [
+        [number(value, sd) for value, sd in zip(score.theta, score.theta_sd, strict=True)]
+        for score in result.scores
+    ]
+    wide = _table("parameters ± 2σ", *names)
+    for score, row in zip(result.scores, cells, strict=True):
+        wide.add_row(score.name, *row)
+    tall = _table("parameters ± 2σ", *(score.name for score in result.scores))
+    for name, column in zip(names, zip(*cells, strict=True), strict=True):
+        tall.add_row(name, *column)
+    return wide, tall
+
+
+def _print_table(console: Console, table: Table, otherwise: Table | None = None) -> None:
+    """Print a table after an empty line, whole; the narrower one where the terminal is narrow."""
+    roomy = console.options.update(width=10_000)
+    widths = [Measurement.get(console, roomy, each).maximum for each in (table, otherwise or table)]
+    if widths[0] > console.width and widths[1] < widths[0]:
+        table, widths = otherwise or table, widths[::-1]
+    terminal = console.width
+    console.width = max(terminal, widths[0])  # a terminal wraps a row, rich would cut it
+    try:
+        console.print()
+        console.print(table, soft_wrap=True)
+    finally:
+        console.width = terminal
 
 
 def _warnings(result: Replay) -> list[str]:

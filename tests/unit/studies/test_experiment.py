@@ -69,6 +69,11 @@ def test_a_limit_cycle_is_found_under_noise(period_s, amplitude):
     assert found.cycle_k == pytest.approx(2 * amplitude, rel=0.15)
 
 
+def test_noise_about_the_mean_is_not_counted_as_cycles():
+    wave = np.sin(2 * np.pi * T_S / 200.0) + 0.3 * NOISE[0]
+    assert limit_cycle(T_S, wave)[1] == pytest.approx(200.0, rel=0.05)
+
+
 @pytest.mark.parametrize("values", [NOISE[0], np.zeros(3600), 1e-3 * T_S, NOISE[0][:1]])
 def test_noise_rest_and_drift_are_no_limit_cycle(values):
     assert limit_cycle(T_S[: len(values)], values) is None
