@@ -138,6 +138,11 @@ def test_zeros_outside_the_unit_circle_are_not_cancelled():
     assert last_c == pytest.approx(40.0, abs=0.01)
 
 
+def test_a_first_input_without_effect_is_a_zero_that_cannot_be_cancelled():
+    law = SelfTuningMinimumVariance(Arx(1, 2))
+    assert power(law, [-0.9, 0.0, 0.1], u=(7.0, 7.0)) == pytest.approx((37.5 - 0.9 * 37.0) / 0.1)
+
+
 def test_zeros_inside_the_unit_circle_are_cancelled():
     structure, theta = Arx(1, 3), [-0.95, 0.2, 0.1, 0.01]
     law = SelfTuningMinimumVariance(structure)

@@ -183,6 +183,7 @@ def test_a_robust_noise_variance_of_constant_readings_stays_above_zero():
     for _ in range(100):
         belief = law.update(belief, np.ones(1), 1.0)
     assert math.isclose(belief.R2, 1e-8)
+    assert len(belief._memory.residuals) == 60  # what is remembered does not grow
     assert not belief.rejected
 
 
