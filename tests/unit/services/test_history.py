@@ -27,6 +27,7 @@ from thermoctl.services.history.schema import SCHEMA_VERSION, row_of
 from thermoctl.signals import Alarm, Event
 
 RUN = RunInfo("1.2.3", '{"loops": {"tank": {"setpoint_c": 41.0}}}', started_utc_s=1.7e9)
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 START = datetime.fromtimestamp(1.7e9, UTC)
 
 
@@ -90,6 +91,31 @@ def test_since_is_inclusive_and_until_is_not(recorded):
         recorded, "tank", START + timedelta(seconds=10), START + timedelta(seconds=20)
     )
     assert half.columns["t_s"].tolist() == list(range(10, 20))
+
+
+@given(
+    walls=st.lists(st.integers(0, 20), min_size=1, max_size=20),
+    since=st.none() | st.integers(-1, 21),
+    until=st.none() | st.integers(-1, 21),
+)
+@settings(max_examples=60, deadline=None)
+def test_a_range_holds_its_cycles_in_order_however_the_wall_clock_moved(
+    walls, since, until, cycle_at, tmp_path_factory
+):
+    path = tmp_path_factory.mktemp("range") / "h.sqlite"
+    times = iter(walls)
+    writer = HistoryWriter(path, RUN, wall_clock=lambda: float(next(times, 0)))
+    for t_s in range(len(walls)):
+        writer.publish(cycle_at(float(t_s)))
+    writer.close()
+    low, high = (-1 if since is None else since), (99 if until is None else until)
+    expected = [t_s for t_s, wall in enumerate(walls) if low <= wall < high]
+    bounds = [None if s is None else EPOCH + timedelta(seconds=s) for s in (since, until)]
+    if expected:
+        assert read_history(path, None, *bounds).columns["t_s"].tolist() == expected
+    else:
+        with pytest.raises(Unavailable, match="should hold cycles"):
+            read_history(path, None, *bounds)
 
 
 def test_only_the_columns_asked_for_are_read(recorded):

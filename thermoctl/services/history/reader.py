@@ -37,6 +37,18 @@ KINDS: Final[Mapping[str, Kind]] = {
     **{column.name: column.kind for column in COLUMNS},
 }
 
+EVER_S: Final = 1e18
+_SPAN: Final = """
+    SELECT min(id), max(id) FROM cycles INDEXED BY cycles_by_wall
+    WHERE wall_utc_s >= :since AND wall_utc_s < :until
+"""
+_SELECT: Final = """
+    SELECT {} FROM cycles WHERE id BETWEEN :first AND :last
+    AND wall_utc_s >= :since AND wall_utc_s < :until AND loop = coalesce(:loop, loop) ORDER BY id
+"""
+"""In the order of recording, even where the wall clock went back; the index finds the span, or a
+day would cost the reading of a year."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
@@ -141,25 +153,16 @@ def export(
 
 
 class _Range:
-    """Which cycles: a WHERE clause, its values, and words for a message."""
+    """Which cycles: the values of `_SPAN` and `_SELECT`, and words for a message."""
 
     def __init__(self, loop: str | None, since: datetime | None, until: datetime | None) -> None:
-        clauses: list[str] = []
-        values: list[Any] = []
-        words = ["cycles"]
-        if loop is not None:
-            clauses.append("loop = ?")
-            values.append(loop)
-            words.append(f"of loop {loop!r}")
-        bounds = (("since", "wall_utc_s >= ?", since), ("until", "wall_utc_s < ?", until))
-        for name, clause, when in bounds:
-            if when is not None:
-                clauses.append(clause)
-                values.append(_utc_s(name, when))
-                words.append(f"{name} {when.isoformat()}")
-        self.where = " AND ".join(clauses) or "1"
-        self.values = values
-        self.words = " ".join(words)
+        self.loop = loop
+        self.since_s = -EVER_S if since is None else _utc_s("since", since)
+        self.until_s = EVER_S if until is None else _utc_s("until", until)
+        words = ["cycles", "" if loop is None else f"of loop {loop!r}"]
+        words += ["" if since is None else f"since {since.isoformat()}"]
+        words += ["" if until is None else f"until {until.isoformat()}"]
+        self.words = " ".join(filter(None, words))
 
 
 def _export(path: Path, stream: TextIO, which: _Range) -> int:
@@ -179,9 +182,10 @@ def _rows(
     connection: sqlite3.Connection, path: Path, names: Sequence[str], which: _Range
 ) -> Iterator[list[tuple[Any, ...]]]:
     """Yield the rows in bunches, in the order of recording; raise when there are none."""
-    cursor = connection.execute(
-        f"SELECT {', '.join(names)} FROM cycles WHERE {which.where} ORDER BY id", which.values
-    )
+    values = {"loop": which.loop, "since": which.since_s, "until": which.until_s}
+    first, last = connection.execute(_SPAN, values).fetchone()
+    values |= {"first": first, "last": last}
+    cursor = connection.execute(_SELECT.format(", ".join(names)), values)
     rows = cursor.fetchmany(ROWS_AT_ONCE)
     if not rows:
         raise Unavailable(f"{path} should hold {which.words}, but {_contents(connection)}")
