@@ -18,7 +18,8 @@ EVAPORATION_KG_PER_J_K = 0.622 / (1006.0 * 0.90 * 101_325.0)
 BOILING_S = 2.0
 """How fast water above 100 degC sheds its excess: 5 kW keep half a litre 5 K above 100 degC."""
 DRY_PART = 0.05
-"""Part of the nominal mass below which no more evaporates: the film on the bottom."""
+"""Part of the nominal mass that stays as a film. Vapour fades out from twice as much: cut off
+sharply, it would vanish from the second stage of a step only, and the water would overheat."""
 LONGEST_STEP_S = 0.5
 """The fastest time constant, mixing in the smallest tank, is 2.6 s."""
 
@@ -157,13 +158,14 @@ def temperatures(k: Conductances, heat: Heat) -> Temperatures:
 
 def evaporation_kg_per_s(k: Conductances, water_c: float, water_kg: float) -> float:
     """Return the vapour that leaves the surface; negative where the air condenses on it."""
-    if water_kg <= DRY_PART * k.nominal_kg:
+    wet = (water_kg / k.nominal_kg - DRY_PART) / DRY_PART
+    if wet <= 0.0:
         return 0.0
     vapour = k.evaporation_kg_per_pa_s * (saturation_pa(water_c) - k.vapour_pa)
     if water_c > 100.0:
         excess_w = water_kg * WATER_J_PER_KG_K * (water_c - 100.0) / BOILING_S
         vapour += excess_w / vaporisation_j_per_kg(water_c)
-    return vapour
+    return min(wet, 1.0) * vapour
 
 
 class Outside(NamedTuple):

@@ -159,3 +159,14 @@ def test_a_tank_in_air_has_no_bath_to_speak_of():
     tank.advance(10.0, 0.4)
     assert math.isnan(tank.temperatures.bath_c)
     assert tank.heat.bath_ice_kg == 0.0
+
+
+def test_a_tank_that_boils_dry_never_gets_hotter_than_its_element():
+    tank = Tank(TankParameters.scaled(0.5, 5000.0), np.random.default_rng(2))
+    for _ in range(800):
+        tank.advance(0.5, 1.0)
+        temperatures = tank.temperatures
+        assert temperatures.still_c <= temperatures.water_c + 0.1
+        assert temperatures.water_c < temperatures.element_c + 0.1
+    assert tank.heat.water_kg > 0.0
+    assert temperatures.water_c > 300.0
