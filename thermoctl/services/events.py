@@ -59,6 +59,7 @@ _BY_LEVEL: Final = {
         "config.loaded",
         "history.recovered",
         "latch.cleared",
+        "latch.saved",
         "loop.not_resumed",
         "loop.started",
         "loop.stopped",

@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Final
 
 from thermoctl.services.store import Latch, LatchStore
-from thermoctl.signals import Alarm
+from thermoctl.signals import Alarm, Event
 
 POLL_S: Final = 0.5
 """How soon a deleted file is noticed, and a failed write tried again."""
@@ -34,6 +34,8 @@ class LatchKeeper:
         expected to put a request into the loop's queue.
     wall_clock : callable
         Seconds since 1970 UTC.
+    report : callable or None
+        Receives ``latch.unsaved`` and ``latch.saved`` when that changes, in the keeper's thread.
     poll_s : float
         Time between two looks at the files.
     """
@@ -44,15 +46,18 @@ class LatchKeeper:
         on_ack: Callable[[str], None],
         *,
         wall_clock: Callable[[], float] = time.time,
+        report: Callable[[Event], None] | None = None,
         poll_s: float = POLL_S,
     ) -> None:
         self._store, self._on_ack = store, on_ack
-        self._wall_clock, self._poll_s = wall_clock, poll_s
+        self._wall_clock, self._report, self._poll_s = wall_clock, report, poll_s
         self._told: queue.SimpleQueue[tuple[str, Latch | None] | None] = queue.SimpleQueue()
         self._last_told: dict[str, str | None] = {}
         self._wanted: dict[str, Latch | None] = {}
         self._durable: dict[str, bool] = {}
         self._error: str | None = None
+        self._told_problem: str | None = None
+        self._since_s = 0.0
         self._closing = False
         self._thread = threading.Thread(target=self._run, name="latches", daemon=True)
 
@@ -64,7 +69,7 @@ class LatchKeeper:
         """Say that `loop` is latched by `alarm`; cheap enough to repeat every cycle."""
         if self._last_told.get(loop) == alarm.code:
             return
-        self._last_told[loop] = alarm.code
+        self._last_told[loop], self._since_s = alarm.code, alarm.since_s
         latch = Latch(alarm.code, alarm.text, alarm.fault, self._wall_clock())
         self._told.put((loop, latch))
 
@@ -110,6 +115,17 @@ class LatchKeeper:
                     self._hold(loop, latch)
             except OSError as error:
                 self._error = f"the latch of {loop} on disk: {error}"
+        self._tell_changes()
+
+    def _tell_changes(self) -> None:
+        problem, before = self.problem, self._told_problem
+        self._told_problem = problem
+        if self._report is None or (problem is None) == (before is None):
+            return
+        if problem is None:
+            self._report(Event(self._since_s, "latch.saved"))
+        else:
+            self._report(Event(self._since_s, "latch.unsaved", {"why": problem}))
 
     def _take_news(self) -> None:
         while True:

@@ -30,8 +30,13 @@ def acks():
 
 
 @pytest.fixture
-def keeper(store, acks, wall_clock):
-    return LatchKeeper(store, acks.append, wall_clock=wall_clock)
+def told():
+    return []
+
+
+@pytest.fixture
+def keeper(store, acks, wall_clock, told):
+    return LatchKeeper(store, acks.append, wall_clock=wall_clock, report=told.append)
 
 
 def test_a_latch_is_on_disk_after_one_pass(keeper, store):
@@ -102,16 +107,19 @@ def test_a_deleted_file_is_one_request_and_comes_back_until_it_is_granted(keeper
     assert not store.exists("tank")
 
 
-def test_a_write_that_fails_is_tried_until_it_holds(keeper, store, state):
+def test_a_write_that_fails_is_tried_until_it_holds_and_told_once(keeper, store, state, told):
     state.write_text("in the way")
     keeper.latched("tank", ALARM)
-    keeper.keep()
+    for _ in range(3):
+        keeper.keep()
     assert "spare folder" in keeper.problem
     assert store.exists("tank")
     state.unlink()
     keeper.keep()
     assert keeper.problem is None
     assert (state / "latch-tank.json").is_file()
+    assert [event.name for event in told] == ["latch.unsaved", "latch.saved"]
+    assert told[0].t_s == ALARM.since_s
 
 
 def test_without_any_folder_the_latch_waits_in_memory(tmp_path, acks, wall_clock):
