@@ -142,6 +142,8 @@ def _tell(error: BaseException, code: int, arguments: list[str]) -> None:
         click.echo(f"thermoctl: {line}", err=True)
     if "--json" in arguments:
         told: dict[str, Any] = {"kind": type(error).__name__, "text": str(error), "exit_code": code}
+        if problems := getattr(error, "problems", ()):
+            told["problems"] = [problem.as_json() for problem in problems]
         click.echo(json.dumps({"error": told}))
 
 

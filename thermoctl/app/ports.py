@@ -1,0 +1,95 @@
+"""Serial ports as this machine has them: which there are, who may use one and who does."""
+
+from __future__ import annotations
+
+import fcntl
+import grp
+import os
+from pathlib import Path
+from typing import Final
+
+from serial.tools import list_ports
+
+from thermoctl.app.service_commands import SERVICE_STATE
+from thermoctl.services.lock import LONGEST, device_lock_path
+from thermoctl.services.places import runtime_dir
+
+SERVICE_RUN: Final = Path("/run/thermoctl")
+
+
+def serial_ports() -> list[str]:
+    """Return the serial ports of the machine, with what is plugged in where that is known."""
+    return [
+        f"{port.device} ({port.description})" if port.vid is not None else port.device
+        for port in sorted(list_ports.comports())
+    ]
+
+
+def obstacle(port: str) -> str | None:
+    """Return why `port` cannot be used now and what to do, or None; a URL is left to its driver."""
+    if "://" in port:
+        return None
+    if not os.path.exists(port):
+        return f"{port} is not there; plug the board in, or set port to one of the ports above"
+    if not os.access(port, os.R_OK | os.W_OK):
+        return f"{port}: no right to read and write; {_remedy(port)}"
+    for directory in (runtime_dir(), SERVICE_RUN):
+        holder = holder_of(device_lock_path(directory, port))
+        if holder is not None:
+            return f"{port} is in use by a daemon (process {holder})"
+    return None
+
+
+def daemon_holding(directory: Path) -> str | None:
+    """Return the process id of the daemon that runs on the state folder, or as the service."""
+    for each in (directory, SERVICE_STATE):
+        holder = holder_of(each / "daemon.lock")
+        if holder is not None:
+            return holder
+    return None
+
+
+def holder_of(lock: Path) -> str | None:
+    """Return the process id in a lock file that is held, None when it is free; takes nothing."""
+    try:
+        descriptor = os.open(lock, os.O_RDONLY | os.O_NOFOLLOW)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return os.pread(descriptor, LONGEST, 0).decode(errors="replace").strip() or "unknown"
+    finally:
+        os.close(descriptor)
+    return None
+
+
+def _remedy(port: str) -> str:
+    """Return what gives the right to use a port."""
+    group = os.stat(port).st_gid
+    try:
+        name = grp.getgrgid(group).gr_name
+    except KeyError:
+        name = str(group)
+    if group in os.getgroups():
+        return f"its group {name} has none either; install the udev rule"
+    return f"join its group and log in again: sudo usermod -aG {name} $USER"
+
+
+def used_by(port: str) -> str | None:
+    """Return which other process has `port` open, as far as this user may see.
+
+    That alone is no obstacle: whoever keeps a pseudo terminal alive holds it open as well.
+    """
+    device = os.path.realpath(port)
+    for folder in Path("/proc").glob("[0-9]*"):
+        if folder.name == str(os.getpid()):
+            continue
+        try:
+            opened = {os.readlink(each) for each in (folder / "fd").iterdir()}
+            name = (folder / "comm").read_text(errors="replace").strip()
+        except OSError:
+            continue  # gone, or somebody else's
+        if device in opened:
+            return f"{device} is open in process {folder.name} ({name})"
+    return None
