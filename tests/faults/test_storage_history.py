@@ -258,7 +258,7 @@ SMALL_DISK = """
 import json, subprocess, sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[2])
-from test_storage_history import HistoryWriter, RUN, cycle_at, stored_times
+from test_storage_history import HistoryWriter, RUN, cycle_at, read_history, stored_times
 from thermoctl.services.store import Latch, LatchStore
 disk = Path(sys.argv[1])
 def mount(*options):
@@ -295,7 +295,7 @@ found = latches.load("tank") is not None
 mount("-o", "remount,rw")
 go(10)
 print(json.dumps({"told": told, "seen": seen, "held": held, "found": found,
-                  "times": stored_times(path)}))
+                  "times": stored_times(path), "runs": len(read_history(path).runs)}))
 """
 
 
@@ -328,6 +328,10 @@ def test_on_a_full_disk_cycles_are_counted_and_recording_recovers_by_itself(smal
     assert freed["error"] is None
     assert freed["waiting"] <= 1  # the event that says so
     assert small_disk["told"][:3] == ["history.failed", "history.drops", "history.recovered"]
+
+
+def test_a_run_stays_one_run_through_every_failure(small_disk):
+    assert small_disk["runs"] == 2  # one before the writer was closed, one after
 
 
 def test_on_a_read_only_disk_cycles_wait_and_none_is_lost(small_disk):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from thermoctl.errors import Unavailable
@@ -268,6 +268,7 @@ def test_each_start_is_a_run_of_its_own(path, cycle_at):
     value=st.one_of(st.floats(), st.integers(-(2**40), 2**40).map(np.int64)),
     loop=st.text(st.characters(exclude_categories=())),
 )
+@example(value=math.inf, loop="\ud800")
 @settings(max_examples=200)
 def test_every_cycle_becomes_plain_values(cycle_at, value, loop):
     row = row_of(cycle_at(1.0, loop=loop, temperature_c=float(value), true_temperature_c=value))

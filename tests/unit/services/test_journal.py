@@ -15,7 +15,7 @@ import threading
 import numpy as np
 import pytest
 import structlog
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from thermoctl.services.events import PRIORITIES
@@ -89,6 +89,7 @@ values = st.one_of(
 
 
 @given(fields=st.dictionaries(st.text(st.characters(exclude_categories=())), values, max_size=4))
+@example(fields={"\ud800": "\ud800", "\x1b": "\x1b[2J", "x": np.array([math.nan])})
 @settings(max_examples=150, deadline=None)
 @pytest.mark.parametrize("sink_of", [json_sink, lambda fd: human_sink(fd, colors=False)])
 def test_whatever_the_fields_hold_an_event_is_one_line(sink_of, fields):
@@ -96,6 +97,7 @@ def test_whatever_the_fields_hold_an_event_is_one_line(sink_of, fields):
 
 
 @given(fields=st.dictionaries(st.text(st.characters(exclude_categories=())), values, max_size=4))
+@example(fields={"\ud800": "\ud800", "\x1b": "\x1b[2J", "x": np.array([math.nan])})
 @settings(max_examples=150, deadline=None)
 def test_whatever_the_fields_hold_a_native_message_can_be_parsed(fields):
     record = {**fields, "timestamp": "t", "level": "error", "event": "loop.started"}
@@ -108,6 +110,7 @@ def test_whatever_the_fields_hold_a_native_message_can_be_parsed(fields):
 def test_journald_receives_native_fields(tmp_path):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as journald:
         journald.bind(str(tmp_path / "socket"))
+        journald.settimeout(10.0)
         journal = Journal(native_sink(str(tmp_path / "socket")))
         journal.emit(Event(12.5, "sensor.open", {"text": "one\ntwo"}), "tank")
         journal.write_waiting()
@@ -130,6 +133,7 @@ def test_journald_may_go_away_and_come_back(tmp_path):
     assert journal.dropped == 1
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as journald:
         journald.bind(str(place))
+        journald.settimeout(10.0)
         journal.emit(OPEN)
         journal.write_waiting()
         messages = [parsed(journald.recv(65536)) for _ in range(2)]
@@ -146,6 +150,7 @@ def test_native_fields_go_to_journald_only_where_it_reads_our_stderr(
 ):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as journald:
         journald.bind(str(tmp_path / "socket"))
+        journald.settimeout(10.0)
         with (tmp_path / "log").open("wb") as stream:
             status = os.fstat(stream.fileno())
             environ = {"JOURNAL_STREAM": f"{status.st_dev}:{status.st_ino + inode_off_by}"}

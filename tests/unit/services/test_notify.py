@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import socket
+import threading
 
 import pytest
 
@@ -65,8 +66,13 @@ def test_a_manager_that_is_gone_is_no_error(tmp_path):
 
 def test_a_manager_that_never_reads_does_not_block(manager):
     _, environ = manager
-    notifier = Notifier(environ)
-    sent = [notifier.status("x" * 1000) for _ in range(5000)]
+    notifier, sent = Notifier(environ), []
+    sender = threading.Thread(
+        target=lambda: sent.extend(notifier.status("x" * 1000) for _ in range(5000)), daemon=True
+    )
+    sender.start()
+    sender.join(60.0)
+    assert not sender.is_alive()
     notifier.close()
     assert sent[0]
     assert not sent[-1]
