@@ -36,7 +36,7 @@ _READ_ATTEMPTS = 2
 _WRITE_ATTEMPTS = 3
 _OPEN_WAIT_S = 0.25
 _CLOSE_S = 0.3
-_BITS_PER_BYTE = 10
+_BITS_PER_BYTE = 10  # with start and stop bit
 _OUTPUT_MODES = {"burst": 0, "phase-angle": 1}
 _STARTED_ANEW = Flag.RESET | Flag.UNCONFIGURED
 
@@ -153,7 +153,8 @@ class ThermoDaq:
                 self._check_readback(reading)
         if reading.count == 0:
             return {}
-        made_s = max(answer.received_s - self._on_the_line_s(answer.reply), asked_s)
+        on_the_line_s = frames.length_of(answer.reply) * _BITS_PER_BYTE / self._settings.baud
+        made_s = max(answer.received_s - on_the_line_s, asked_s)
         sample = RawSample(
             t_s=made_s - reading.age_ms / 1000.0,
             counts=float(reading.total),
@@ -308,11 +309,6 @@ class ThermoDaq:
         return self._exchange.ask(
             letter, *arguments, deadline_s=deadline_s, wait_s=wait_s, attempts=attempts
         )
-
-    def _on_the_line_s(self, reply: Reply) -> float:
-        """Return how long `reply` took to be transmitted."""
-        length = frames.SHORTEST_REPLY + sum(len(field) + 1 for field in reply.fields[1:])
-        return length * _BITS_PER_BYTE / self._settings.baud
 
     def _check_open(self) -> None:
         if self._state != "open":

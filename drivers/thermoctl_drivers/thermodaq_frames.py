@@ -158,6 +158,11 @@ def decode(line: bytes) -> Reply:
     return Reply(number, letter, tuple(fields.split()))
 
 
+def length_of(reply: Reply) -> int:
+    """Return how many bytes the line of `reply` had."""
+    return len(b"<00 H*0000\n") + sum(1 + len(field) for field in reply.fields)
+
+
 def hello(reply: Reply) -> Hello:
     """Return the identity in `reply`; raise `FrameError` when it has another form."""
     try:

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include <avr_adc.h>
+#include <avr_extint.h>
 #include <avr_ioport.h>
 #include <avr_uart.h>
 #include <sim_avr.h>
@@ -34,6 +35,7 @@ struct board {
     struct queue in, out;
     uint64_t on_cycles, edges, off_since;
     uint64_t half_wave_cycles;
+    uint64_t due; /* where the chip should be; a sleeping one overshoots to its next event */
     int level, crossing_high, feeding;
     double millivolts, noise_mv, pickup_mv, mains_hz;
     uint64_t random;
@@ -141,6 +143,8 @@ struct board *thermodaq_sim_new(const char *elf, uint64_t seed)
     board->avr->sleep = no_sleep;
     board->random = seed * 0x9E3779B97F4A7C15ULL + 1;
     board->mains_hz = 50.0;
+    /* The heater pin is INT1's too; a low one would be polled every cycle, 30 times slower. */
+    avr_extint_set_strict_lvl_trig(board->avr, 1, 0);
     uint32_t flags = 0; /* neither echo to the terminal nor real-time naps */
     avr_ioctl(board->avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
     avr_irq_register_notify(
@@ -160,8 +164,8 @@ void thermodaq_sim_free(struct board *board)
 int thermodaq_sim_run(struct board *board, uint64_t cycles)
 {
     avr_t *avr = board->avr;
-    uint64_t end = avr->cycle + cycles;
-    while (avr->cycle < end) {
+    board->due += cycles;
+    while (avr->cycle < board->due) {
         uint64_t before = avr->cycle;
         int state = avr_run(avr);
         if (state == cpu_Crashed || state == cpu_Done)
