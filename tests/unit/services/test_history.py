@@ -134,6 +134,7 @@ def test_the_csv_carries_utc_with_an_offset_and_units(recorded):
     out = io.StringIO()
     assert export(recorded, out, loop="tank") == 60
     rows = list(csv.DictReader(io.StringIO(out.getvalue())))
+    assert "\r" not in out.getvalue()
     assert rows[1]["time_utc"] == "2023-11-14T22:13:21.000+00:00"
     assert rows[1]["temperature_c"] == "41.0"
     assert rows[59]["temperature_c"] == ""
@@ -252,6 +253,16 @@ def test_events_are_kept_with_their_fields(path, cycle_at, wall_clock):
     assert row == (
         "tank", 3.0, "sensor.open", '{"counts": 1023.0, "limit": null, "who": "/x"}'
     )  # fmt: skip
+
+
+def test_an_event_outside_of_any_cycle_is_kept_too(path, wall_clock):
+    writer = HistoryWriter(path, RUN, wall_clock=wall_clock)
+    writer.publish_event(Event(4.0, "board.lost", {"board": "daq"}))
+    writer.close()
+    connection = open_history(path).connection
+    row = connection.execute("SELECT wall_utc_s, loop, t_s, name, fields FROM events").fetchone()
+    connection.close()
+    assert row == (1.7e9, None, 4.0, "board.lost", '{"board": "daq"}')
 
 
 def test_each_start_is_a_run_of_its_own(path, cycle_at):

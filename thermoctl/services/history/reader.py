@@ -167,7 +167,7 @@ class _Range:
 
 def _export(path: Path, stream: TextIO, which: _Range) -> int:
     names = tuple(column.name for column in COLUMNS)
-    writer = csv.writer(stream)
+    writer = csv.writer(stream, lineterminator="\n")
     count = 0
     with _readable(path) as connection:
         for rows in _rows(connection, path, ("wall_utc_s", *names), which):

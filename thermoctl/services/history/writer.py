@@ -35,6 +35,8 @@ CLOCK_STEP_S: Final = 1.0
 
 Report = Callable[[Event], None]
 
+_Told = tuple[Event, str | None]
+
 
 class HistoryWriter:
     """The history of one run of the daemon.
@@ -78,7 +80,7 @@ class HistoryWriter:
         self._wall_clock = wall_clock
         self._report = report
         self._commit_every_s = commit_every_s
-        self._feed: Feed[tuple[float, Cycle]] = Feed(feed_size)
+        self._feed: Feed[tuple[float, Cycle | _Told]] = Feed(feed_size)
         self._waiting: deque[Row] = deque(maxlen=2 * feed_size)  # events come on top of cycles
         self._lost_waiting = self._written = self._set_aside = 0
         self._reported_drops = 0
@@ -96,6 +98,10 @@ class HistoryWriter:
     def publish(self, cycle: Cycle) -> None:
         """Hand `cycle` over: one append, whatever the disk is doing."""
         self._feed.put((self._wall_clock(), cycle))
+
+    def publish_event(self, event: Event, loop: str | None = None) -> None:
+        """Hand over an event that belongs to no cycle, such as ``board.lost``, as cheaply."""
+        self._feed.put((self._wall_clock(), (event, loop)))
 
     def close(self, timeout_s: float = 2.0) -> bool:
         """Write what waits and close the file; return whether all of it reached the disk in time.
@@ -161,14 +167,20 @@ class HistoryWriter:
 
     def _drain(self) -> None:
         """Turn what the loop published into rows."""
-        for wall_utc_s, cycle in self._feed.take():
-            self._watch_wall_clock(wall_utc_s, cycle.step.t_s)
-            try:
-                self._keep((INSERT_CYCLE, (wall_utc_s, *row_of(cycle))))
-            except (TypeError, ValueError, OverflowError):  # a plug-in's truth may hold anything
-                self._lost_waiting += 1
-            for event in cycle.step.events:
-                self._keep((INSERT_EVENT, (wall_utc_s, *event_row_of(event, cycle.loop))))
+        for wall_utc_s, item in self._feed.take():
+            if isinstance(item, Cycle):
+                self._keep_cycle(wall_utc_s, item)
+            else:
+                self._keep((INSERT_EVENT, (wall_utc_s, *event_row_of(*item))))
+
+    def _keep_cycle(self, wall_utc_s: float, cycle: Cycle) -> None:
+        self._watch_wall_clock(wall_utc_s, cycle.step.t_s)
+        try:
+            self._keep((INSERT_CYCLE, (wall_utc_s, *row_of(cycle))))
+        except (TypeError, ValueError, OverflowError):  # a plug-in's truth may hold anything
+            self._lost_waiting += 1
+        for event in cycle.step.events:
+            self._keep((INSERT_EVENT, (wall_utc_s, *event_row_of(event, cycle.loop))))
 
     def _keep(self, row: Row) -> None:
         self._lost_waiting += len(self._waiting) == self._waiting.maxlen
