@@ -135,6 +135,8 @@ def test_what_an_interrupted_installation_left_is_made_anew(machine, tmp_path):
     machine.has("pip", PIP.format("23.0"))
     half_made = machine.copy / ".venv" / "lib"
     half_made.mkdir(parents=True)
+    (half_made.parent / "bin").mkdir()  # even a python that works does not make it whole
+    shutil.copy2(machine.bin / "python3", half_made.parent / "bin" / "python")
     writing = machine.copy / ".venv-making"
     writing.mkdir()
     ended = subprocess.Popen(["true"])
