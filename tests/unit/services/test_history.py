@@ -298,6 +298,12 @@ def test_the_thread_stores_what_was_published_before_it_closes(path, cycle_at):
     assert writer.health().status == "down"
 
 
+@pytest.mark.parametrize("text", ["", "setpoint_c = 41", "[1]"])
+def test_a_configuration_that_is_no_json_object_is_refused(text):
+    with pytest.raises(ValueError):
+        RunInfo("1.0", text)
+
+
 @pytest.mark.parametrize(
     "wrong", [{"feed_size": 0}, {"max_cycles": 0}, {"commit_every_s": math.nan}]
 )

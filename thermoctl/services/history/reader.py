@@ -101,12 +101,9 @@ def read_history(
     if unknown := set(columns) - set(KINDS):
         raise ValueError(f"columns must be some of {', '.join(KINDS)}, got {sorted(unknown)}")
     names = tuple(dict.fromkeys((*columns, "run")))
-    parts: list[list[npt.NDArray[Any]]] = [[] for _ in names]
+    which = _Range(loop, since, until)
     with _readable(path) as connection:
-        for rows in _rows(connection, path, names, _Range(loop, since, until)):
-            for part, name, values in zip(parts, names, zip(*rows, strict=True), strict=True):
-                part.append(_as_array(KINDS[name], values))
-        whole = {name: np.concatenate(part) for name, part in zip(names, parts, strict=True)}
+        whole = _columns(names, _rows(connection, path, names, which))
         numbers = [int(number) for number in np.unique(whole["run"])]
         runs = {number: _run(connection, number) for number in numbers}
         steps = [step for number in numbers for step in _clock_steps(connection, number)]
@@ -192,6 +189,17 @@ def _rows(
     while rows:
         yield rows
         rows = cursor.fetchmany(ROWS_AT_ONCE)
+
+
+def _columns(
+    names: Sequence[str], bunches: Iterator[list[tuple[Any, ...]]]
+) -> dict[str, npt.NDArray[Any]]:
+    """Turn bunches of rows into whole columns, one bunch at a time."""
+    parts: list[list[npt.NDArray[Any]]] = [[] for _ in names]
+    for rows in bunches:
+        for part, name, values in zip(parts, names, zip(*rows, strict=True), strict=True):
+            part.append(_as_array(KINDS[name], values))
+    return {name: np.concatenate(part) for name, part in zip(names, parts, strict=True)}
 
 
 def _contents(connection: sqlite3.Connection) -> str:

@@ -6,6 +6,7 @@ and the header of the CSV all follow from it.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -38,11 +39,20 @@ class RunInfo:
         The whole configuration in force, as JSON text.
     started_utc_s : float or None
         Wall clock at the start, in s since 1970 UTC; None: when the first cycle is stored.
+
+    Raises
+    ------
+    ValueError
+        The configuration is no JSON object.
     """
 
     version: str
     configuration: str = "{}"
     started_utc_s: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(json.loads(self.configuration), dict):
+            raise ValueError(f"configuration must be a JSON object, got {self.configuration!r}")
 
 
 @dataclass(frozen=True, slots=True)
