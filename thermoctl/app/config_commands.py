@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -67,12 +66,7 @@ def runnable(files: list[Path]) -> Settings:
 def show(configs: tuple[Path, ...], as_json: bool) -> None:
     """Print the configuration in force, defaults included, as TOML."""
     settings = load_all(list(configs) or default_files())
-    click.echo(settings.as_json() if as_json else toml_text(in_force(settings)), nl=as_json)
-
-
-def in_force(settings: Settings) -> dict[str, Any]:
-    """Return every key of `settings` that has a value, ready to be written as TOML."""
-    return settings.model_dump(mode="python", exclude_none=True)
+    click.echo(settings.as_json() if as_json else toml_text(settings.in_force()), nl=as_json)
 
 
 @config.command()

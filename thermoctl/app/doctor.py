@@ -110,16 +110,20 @@ def _ports(settings: Settings | None) -> list[Finding]:
 # -- boards ----------------------------------------------------------------------------------------
 
 
-def boards(settings: Settings, directory: Path, clock: Clock) -> list[Finding]:
+def boards(
+    settings: Settings, directory: Path, clock: Clock, patience_s: float = BOARD_S
+) -> list[Finding]:
     """Return what each board says, asked side by side; skipped where a daemon has them."""
     holder = ports.daemon_holding(directory)
     if holder is not None:
         text = f"not asked: the daemon is running (process {holder})"
         return [Finding(OK, f"board {name}", text) for name in settings.boards]
-    visits = [_Visit(name, each, settings, clock) for name, each in settings.boards.items()]
+    visits = [
+        _Visit(name, each, settings, clock, patience_s) for name, each in settings.boards.items()
+    ]
     for visit in visits:
         visit.start()
-    until_s = time.monotonic() + BOARD_S + _GRACE_S
+    until_s = time.monotonic() + patience_s + _GRACE_S
     return [
         finding
         for visit in visits
@@ -130,9 +134,11 @@ def boards(settings: Settings, directory: Path, clock: Clock) -> list[Finding]:
 class _Visit:
     """Opens one board in a thread of its own, tells it power 0 and reads it once."""
 
-    def __init__(self, name: str, board: BaseModel, settings: Settings, clock: Clock) -> None:
+    def __init__(
+        self, name: str, board: BaseModel, settings: Settings, clock: Clock, patience_s: float
+    ) -> None:
         self._check, self._name, self._board = f"board {name}", name, board
-        self._settings, self._clock = settings, clock
+        self._settings, self._clock, self._patience_s = settings, clock, patience_s
         self._found: list[Finding] = []
         self._thread = threading.Thread(target=self._run, name=self._check, daemon=True)
 
@@ -150,7 +156,7 @@ class _Visit:
         if self._thread.ident is not None:
             self._thread.join(patience_s)
             if self._thread.is_alive():
-                return [*self._found, self._failure(f"no answer within {BOARD_S:g} s")]
+                return [*self._found, self._failure(f"no answer within {self._patience_s:g} s")]
         return list(self._found)
 
     def _run(self) -> None:
@@ -173,7 +179,7 @@ class _Visit:
         return Finding(FAIL, self._check, f"{text}; {advice}")
 
     def _answers(self, board: Board) -> Iterator[Finding]:
-        deadline_s = self._clock.now_s() + BOARD_S
+        deadline_s = self._clock.now_s() + self._patience_s
         who = board.open(deadline_s)
         yield Finding(OK, self._check, f"{who.kind} {who.name}, version {who.version}")
         yield self._dead_man()

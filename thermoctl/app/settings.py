@@ -39,9 +39,15 @@ class Settings(Table):
             raise ConfigError(f"no loop is called {name!r}{plugins.nearest(name, self.loops)}")
         return name, self.loops[name]
 
+    def in_force(self) -> dict[str, Any]:
+        """Return every key that has a value, defaults included, as `load` takes it."""
+        dumped = self.model_dump(mode="python", exclude_none=True)  # JSON mode would lose infinity
+        plain: dict[str, Any] = json.loads(json.dumps(dumped, default=str))
+        return plain
+
     def as_json(self) -> str:
-        """Return the configuration in force, defaults included, as JSON."""
-        return json.dumps(self.model_dump(mode="json", exclude_none=True), sort_keys=True)
+        """Return the configuration in force as JSON, always the same for the same settings."""
+        return json.dumps(self.in_force(), sort_keys=True)
 
 
 def load(source: str | Path | Mapping[str, Any]) -> Settings:

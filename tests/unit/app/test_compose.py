@@ -1,0 +1,139 @@
+"""From settings to a regulator and a loop."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+
+from thermoctl.app.compose import loop_for, regulator_for, started_as, wiring_errors
+from thermoctl.app.parts import plan_for, sensor_for
+from thermoctl.app.settings import load
+from thermoctl.errors import ConfigError
+from thermoctl.model.arx import Arx, KnownGain
+from thermoctl.runtime.clock import SimulatedClock
+from thermoctl.signals import Measurement, Mode, RawSample, SetPoint
+
+
+def changed(text: str, path: str, **values: object) -> dict:
+    """Return the parsed `text` with `values` set in the table at `path`; None removes a key."""
+    content = tomllib.loads(text)
+    table = content
+    for part in path.split("."):
+        table = table.setdefault(part, {})
+    for key, value in values.items():
+        if value is None:
+            table.pop(key)
+        else:
+            table[key] = value
+    return content
+
+
+def errors(content: dict) -> list[str]:
+    """Return what keeps `content` from running."""
+    return [f"{'.'.join(key)}: {text}" for key, text in wiring_errors(load(content))]
+
+
+def test_the_least_configuration_gives_a_regulator_that_is_off(minimal):
+    regulator = regulator_for(load(minimal))
+    step = regulator.step(Measurement(t_s=0.0, temperature_c=25.0))
+    assert step.mode is Mode.OFF
+    assert step.command.power == 0.0
+
+
+def test_a_cold_tank_in_auto_is_heated_towards_its_setpoint(minimal):
+    regulator = regulator_for(load(minimal), loop="tank")
+    regulator.request(Mode.AUTO)
+    regulator.request(SetPoint(50.0))
+    powers = [regulator.step(Measurement(float(t), 25.0)).command.power for t in range(5)]
+    assert powers[-1] > 0.0
+
+
+def test_a_loop_that_is_not_there_is_refused_with_the_nearest_one(minimal):
+    with pytest.raises(ConfigError, match="no loop is called 'tnk'; did you mean 'tank'"):
+        regulator_for(load(minimal), loop="tnk")
+
+
+def test_the_known_gain_is_counted_per_sample(minimal):
+    minimal["loops"]["tank"] |= {"period_s": 2.0, "model": {"gain_k_per_s": 0.05}}
+    structure = plan_for(load(minimal).loops["tank"]).identifier.structure
+    assert structure == KnownGain(0.1)
+
+
+def test_structure_arx_has_the_orders_that_are_given(minimal):
+    minimal["loops"]["tank"]["model"] = {"structure": "arx", "n": 3, "m": 1}
+    structure = plan_for(load(minimal).loops["tank"]).identifier.structure
+    assert isinstance(structure, Arx)
+    assert (structure.n, structure.m) == (3, 1)
+
+
+@pytest.mark.parametrize(
+    ("curve", "more", "volts", "temperature_c"),
+    [
+        ("lm335", {}, 3.1065, 37.5),
+        ("lm35", {}, 0.375, 37.5),
+        ("tmp36", {}, 0.875, 37.5),
+        ("linear", {"kelvin_per_v": 20.0, "zero_v_c": 10.0}, 2.0, 50.0),
+        # The divider at 37.5 degC: 5 V over R and 1 kohm; R(37.5) = 114.5749 ohm (IEC 60751).
+        ("pt100", {"pull_up_ohm": 1e3}, 5.0 * 114.5749 / 1114.5749, 37.5),
+        ("pt1000", {"pull_up_ohm": 1e3}, 5.0 * 1145.749 / 2145.749, 37.5),
+        ("ntc", {"pull_up_ohm": 1e4}, 2.5, 25.0),
+    ],
+)
+def test_every_curve_reads_a_known_temperature(whole, curve, more, volts, temperature_c):
+    table = load(changed(whole, "loops.tank.sensor", curve=curve, **more)).loops["tank"].sensor
+    measured = sensor_for(table).measure(RawSample(0.0, volts / 5.0 * 2**20, 2.0**20))
+    assert measured.temperature_c == pytest.approx(temperature_c, abs=2e-3)
+
+
+def test_what_can_run_has_no_wiring_errors_and_gives_a_loop(whole):
+    settings = load(tomllib.loads(whole))
+    assert list(wiring_errors(settings)) == []
+    finished = []
+    loop = loop_for(settings, SimulatedClock(), finished.append, beside=False)
+    loop.cycle(0.0)
+    assert [cycle.loop for cycle in finished] == ["tank"]
+    loop.shut_down()
+
+
+@pytest.mark.parametrize("part", ["sensor", "actuator"])
+def test_a_loop_without_a_channel_cannot_run(whole, part):
+    content = changed(whole, "loops.tank", **{part: None})
+    assert errors(content) == [f"loops.tank: needs a table [loops.tank.{part}] to run"]
+    with pytest.raises(ConfigError, match=rf"\[loops.tank.{part}\]"):
+        loop_for(load(content), SimulatedClock(), lambda cycle: None)
+
+
+def test_two_loops_must_agree_on_the_period(whole):
+    content = changed(whole, "loops.mash", setpoint_c=65.0, trip_above_c=80.0, period_s=2.0)
+    for part in ("sensor", "actuator"):
+        content["loops"]["mash"][part] = {"board": "daq", "output": "second"}
+    del content["loops"]["mash"]["sensor"]["output"]
+    assert errors(content) == [
+        "loops.tank.period_s: expected one for all loops, got [1.0, 2.0]",
+        "loops.mash.period_s: expected one for all loops, got [1.0, 2.0]",
+    ]
+
+
+def test_two_loops_may_not_drive_one_output(whole):
+    content = tomllib.loads(whole)
+    content["loops"]["mash"] = dict(content["loops"]["tank"])
+    assert errors(content) == [
+        "loops.mash.actuator: expected one loop for output 'heater' of 'daq', got tank, mash"
+    ]
+
+
+def test_a_board_without_a_dead_man_must_be_accepted(whole, foreign):
+    content = changed(whole, "boards.daq", kind="foreign", volume_l=None)
+    assert "accept_no_dead_man = true" in errors(content)[0]
+    with pytest.raises(ConfigError, match="cannot switch its output off by itself"):
+        loop_for(load(content), SimulatedClock(), lambda cycle: None)
+    content["service"] = {"accept_no_dead_man": True}
+    assert errors(content) == []
+
+
+def test_a_start_in_another_mode_leaves_the_rest_as_it_is(whole):
+    settings = load(tomllib.loads(whole))
+    started = started_as(settings, {"tank": (Mode.AUTO, 40.0)})
+    assert (started.loops["tank"].mode, started.loops["tank"].setpoint_c) == (Mode.AUTO, 40.0)
+    assert started_as(started, {"tank": (Mode.OFF, 37.5)}) == settings

@@ -1,0 +1,429 @@
+"""Reading a configuration: what is taken, and how what is wrong is told."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thermoctl.app.compose import regulator_for, wiring_errors
+from thermoctl.app.document import BadConfiguration, exposures
+from thermoctl.app.settings import load, load_all
+from thermoctl.app.tables import (
+    ActuatorTable,
+    GuardsTable,
+    HistoryTable,
+    LoopTable,
+    ModelTable,
+    SensorTable,
+    ServiceTable,
+)
+from thermoctl.errors import ConfigError
+from thermoctl_drivers.simulated import SimulatedSettings
+
+PROFILES = sorted((Path(__file__).parents[3] / "config").glob("*.toml"))
+TABLES = {
+    "loops.tank": LoopTable,
+    "loops.tank.sensor": SensorTable,
+    "loops.tank.actuator": ActuatorTable,
+    "loops.tank.model": ModelTable,
+    "loops.tank.estimator.guards": GuardsTable,
+    "boards.daq": SimulatedSettings,
+    "history": HistoryTable,
+    "service": ServiceTable,
+}
+KEYS = [(t, k) for t, model in TABLES.items() for k in model.model_fields if len(k) >= 4]
+WHOLE = """\
+[boards.daq]
+kind = "simulated"
+
+[loops.tank]
+setpoint_c = 37.5
+trip_above_c = 60.0
+
+[loops.tank.sensor]
+board = "daq"
+
+[loops.tank.actuator]
+board = "daq"
+"""
+
+
+def problems(source) -> list[str]:
+    """Return a line for everything that is wrong with `source`."""
+    with pytest.raises(BadConfiguration) as caught:
+        load(source)
+    return str(caught.value).splitlines()
+
+
+def tank(minimal: dict, **keys: object) -> dict:
+    """Return the least configuration with more keys in its loop."""
+    minimal["loops"]["tank"] |= keys
+    return minimal
+
+
+# -- what is taken ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", PROFILES, ids=lambda path: path.stem)
+def test_every_profile_loads_can_run_and_gives_regulators(path):
+    loaded = load(path)
+    assert list(wiring_errors(loaded)) == []
+    for name in loaded.loops:
+        regulator_for(loaded, name)
+
+
+def test_there_are_profiles():
+    assert {path.stem for path in PROFILES} >= {"aquarium", "ozbek2021", "thermodaq"}
+
+
+def test_what_is_in_force_loads_as_the_same_settings(minimal):
+    minimal["loops"]["tank"]["estimator"] = {"kind": "ckf", "inflation_max": math.inf}
+    loaded = load(minimal)
+    assert load(loaded.in_force()) == loaded
+
+
+def test_whole_numbers_are_taken_for_floats(minimal):
+    loaded = load(tank(minimal, setpoint_c=40)).loops["tank"].setpoint_c
+    assert loaded == 40.0
+    assert isinstance(loaded, float)
+
+
+def test_a_controller_may_be_named_without_a_table(minimal):
+    assert load(tank(minimal, controller="on-off")).loops["tank"].controller.kind == "on-off"
+
+
+def test_settings_of_a_foreign_driver_take_lists_and_refuse_text_for_numbers(minimal, foreign):
+    minimal["boards"] = {"daq": {"kind": "foreign", "colours": ["red", "blue"]}}
+    assert load(minimal).boards["daq"].colours == ("red", "blue")
+    minimal["boards"]["daq"]["gain"] = "2.0"
+    assert problems(minimal) == [
+        'configuration: boards.daq.gain: expected a number, got "2.0" (write it without quotes)'
+    ]
+
+
+def test_a_byte_order_mark_is_overlooked(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text("\ufeff" + WHOLE, encoding="utf-8")
+    assert load(path) == load(tomllib.loads(WHOLE))
+
+
+def test_settings_cannot_be_changed(minimal):
+    with pytest.raises(ValueError, match="frozen"):
+        load(minimal).loops["tank"].setpoint_c = 1.0
+
+
+# -- what is refused -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "came"),
+    [
+        ("37.5", 'a number, got "37.5" (write it without quotes)'),
+        ("warm", 'a number, got "warm"'),
+        (True, "a number, got true"),
+        ([37.5], "a number, got [37.5]"),
+        (math.nan, "a finite number, got NaN"),
+        (math.inf, "a finite number, got Infinity"),
+        (10**400, f"a finite number, got 1{'0' * 59}..."),
+        (-300.0, "at least -273.15, got -300.0"),
+        (3000, "at most 2000, got 3000"),
+    ],
+)
+def test_a_setpoint_that_is_no_temperature_is_refused(minimal, value, came):
+    assert problems(tank(minimal, setpoint_c=value)) == [
+        f"configuration: loops.tank.setpoint_c: expected {came}"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"resume": 1}, "resume: expected true or false, got 1"),
+        ({"mode": "on"}, "mode: expected 'off', 'manual', 'auto' or 'program', got \"on\""),
+        ({"mode": "program"}, "mode: expected off, manual or auto"),
+        ({"period_s": 0.0}, "period_s: expected at least 0.05, got 0.0"),
+        ({"power_max": 1.5}, "power_max: expected at most 1, got 1.5"),
+        ({"jump_k": 0}, "jump_k: expected a number above 0, got 0"),
+        ({"sensor": "daq"}, 'sensor: expected a table, got "daq"'),
+        ({"sensor": {}}, "sensor.board: is missing"),
+        ({"controller": 3}, "controller: expected a table, got 3"),
+        ({"controller": "pid"}, "controller.kind: no controller is called 'pid'"),
+        ({"model": {"n": 2.0}}, "model.n: expected a whole number, got 2.0"),
+        ({"estimator": {"kind": "ckv"}}, "estimator.kind: no estimator is called 'ckv'; did you"),
+        ({"estimator": {"kind": "ckf", "R3": 1}}, "estimator.R3: unknown key; did you mean 'R"),
+        ({"estimator": {"kind": "vff"}}, "estimator.Sigma0: is missing"),
+        ({"estimator": {"R2": -1.0}}, "estimator.R2: must be positive, got -1.0"),
+        ({"estimator": {"theta0": [1.0, 2.0]}}, "estimator.theta0: "),
+        ({"estimator": {"theta0": ["1"]}}, "estimator.theta0.0: expected a number"),
+        ({"controller": {"kind": "manual", "power": 2}}, "controller.power: must lie in [0, 1]"),
+    ],
+)
+def test_a_bad_key_of_a_loop_is_named_with_what_was_expected(minimal, keys, told):
+    [problem] = problems(tank(minimal, **keys))
+    assert problem.startswith(f"configuration: loops.tank.{told}")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "hint"),
+    [
+        ("setpoint_f", 99.5, "unknown key; the unit here is °C: setpoint_c = 37.5"),
+        ("setpoint_k", 310.65, "unknown key; the unit here is °C: setpoint_c = 37.5"),
+        ("period_ms", 500, "unknown key; the unit here is s: period_s = 0.5"),
+        ("period_min", 2, "unknown key; the unit here is s: period_s = 120"),
+        ("trip_above_f", "hot", "unknown key; the unit here is °C: trip_above_c"),
+        ("rise_per_min", 0.1, "unknown key; the unit here is 1/s: rise_per_s"),
+    ],
+)
+def test_a_key_in_another_unit_is_told_the_right_one(minimal, key, value, hint):
+    assert f"configuration: loops.tank.{key}: {hint}" in problems(tank(minimal, **{key: value}))
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"trip_below_c": 70.0}, "trip_below_c 70 must lie below trip_above_c 60"),
+        ({"setpoint_max_c": 65.0}, "set points from -10 to 65 must lie between the trips"),
+        ({"setpoint_c": 60.0}, "setpoint_c 60 must lie from -10 to 60 and below trip_above_c 60"),
+        ({"setpoint_max_c": 30.0}, "setpoint_c 37.5 must lie from -10 to 30"),
+    ],
+)
+def test_limits_that_contradict_each_other_are_refused(minimal, keys, told):
+    [problem] = problems(tank(minimal, **keys))
+    assert told in problem
+
+
+def test_a_typo_does_not_hide_limits_that_contradict_each_other(minimal):
+    lines = problems(tank(minimal, setpoint_c=70.0, perod_s=1.0))
+    assert len(lines) == 2
+    assert "perod_s: unknown key; did you mean 'period_s'?" in lines[0]
+    assert "setpoint_c 70 must lie" in lines[1]
+
+
+def test_a_board_that_is_not_there_is_told_the_nearest_one(minimal):
+    minimal["boards"] = {"daq": {"kind": "simulated"}}
+    assert problems(tank(minimal, sensor={"board": "dac"})) == [
+        "configuration: loops.tank.sensor.board: no table [boards.dac] there; did you mean 'daq'?"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ({}, "loops: expected at least one table [loops.NAME], got none"),
+        ({"loops": {}}, "loops: expected at least one table [loops.NAME], got none"),
+        ({"loops": 3}, "loops: expected tables [loops.NAME], got 3"),
+        ({"loops": {"tank": 3}}, "loops.tank: expected a table, got 3"),
+        ({"boards": {"daq": {}}}, "boards.daq: needs a kind; known: "),
+        ({"boards": {"daq": {"kind": 3}}}, "boards.daq.kind: no driver is called '3'"),
+        ({"boards": []}, "boards: expected tables [boards.NAME], got []"),
+        ({"lops": {}}, "lops: unknown key; did you mean 'loops'?"),
+        ({"history": {"enabled": "yes"}}, 'history.enabled: expected true or false, got "yes"'),
+        ({"service": 1}, "service: expected a table, got 1"),
+    ],
+)
+def test_a_document_that_is_none_is_refused(content, told):
+    assert problems(content)[0].startswith(f"configuration: {told}")
+
+
+def test_a_name_that_is_no_name_is_refused():
+    loop = {"setpoint_c": 37.5, "trip_above_c": 60}
+    assert "named with letters, digits, - and _" in problems({"loops": {"a/b": loop}})[0]
+
+
+# -- where it stands -------------------------------------------------------------------------------
+
+
+def test_everything_wrong_is_told_at_once_with_file_and_line(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text(
+        '[boards.daq]\nkind = "simulatd"\n\n[loops.tank]\nsetpoint_f = 99.5\ntrip_above_c = 60\n'
+        '[loops.tank.sensor]\nboard = "daq"\ninput = 5\n[loops.mash]\nsetpoint_c = 1\n'
+        'trip_above_c = 3\n[loops.mash.controller]\nkind = "on-off"\nhysteresis = 1.0\n'
+    )
+    assert problems(path) == [
+        f"{path}:2: boards.daq.kind: no driver is called 'simulatd'; did you mean 'simulated'?",
+        f"{path}:4: loops.tank.setpoint_c: is missing",
+        f"{path}:9: loops.tank.sensor.input: expected text in quotes, got 5",
+        f"{path}:5: loops.tank.setpoint_f: unknown key; the unit here is °C: setpoint_c = 37.5",
+        f"{path}:15: loops.mash.controller.hysteresis: unknown key; did you mean 'hysteresis_k'?",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("[loops.tank]\nsetpoint_c = \n", 2, "no valid TOML: Invalid value in column 14"),
+        ("[a]\nb = 1\n[a]\n", 3, "no valid TOML"),
+        ("[a]\nb = '''never closed\n\n", 3, "no valid TOML: Expected \"'''\" at end of document"),
+        ("a = " + "9" * 5000, None, "no valid TOML: Exceeds the limit"),
+        ("a = " + "[" * 5000, None, "no valid TOML"),
+    ],
+)
+def test_a_syntax_error_names_file_and_line(tmp_path, text, line, words):
+    path = tmp_path / "bad.toml"
+    path.write_text(text)
+    place = str(path) if line is None else f"{path}:{line}"
+    [problem] = problems(path)
+    assert problem.startswith(f"{place}: {words}")
+
+
+def test_the_problems_travel_as_data(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text(WHOLE.replace("37.5", '"37.5"'))
+    with pytest.raises(BadConfiguration) as caught:
+        load(path)
+    assert [problem.as_json() for problem in caught.value.problems] == [
+        {
+            "file": str(path),
+            "line": 5,
+            "key": "loops.tank.setpoint_c",
+            "text": 'expected a number, got "37.5" (write it without quotes)',
+        }
+    ]
+
+
+def test_several_files_make_one_configuration(tmp_path):
+    boards, loops = WHOLE.split("\n\n", 1)
+    (tmp_path / "a.toml").write_text(boards)
+    (tmp_path / "b.toml").write_text(loops)
+    together = load_all([tmp_path / "a.toml", tmp_path / "b.toml"])
+    assert together == load(tomllib.loads(WHOLE))
+
+
+def test_an_error_in_one_of_several_files_names_that_file(tmp_path):
+    boards, loops = WHOLE.split("\n\n", 1)
+    (tmp_path / "a.toml").write_text(boards)
+    (tmp_path / "b.toml").write_text(loops.replace("setpoint_c", "setpoint"))
+    with pytest.raises(ConfigError) as caught:
+        load_all([tmp_path / "a.toml", tmp_path / "b.toml"])
+    assert f"{tmp_path / 'b.toml'}:2: loops.tank.setpoint: unknown key" in str(caught.value)
+
+
+def test_a_table_may_not_stand_in_two_files(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.toml").write_text(WHOLE)
+    with pytest.raises(ConfigError) as caught:
+        load_all([tmp_path / "a.toml", tmp_path / "b.toml"])
+    second = tmp_path / "b.toml"
+    assert str(caught.value).splitlines() == [
+        f"{second}:1: boards.daq: stands in an earlier file as well",
+        f"{second}:4: loops.tank: stands in an earlier file as well",
+    ]
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(ConfigError, match=r"nowhere\.toml: no such file"):
+        load(tmp_path / "nowhere.toml")
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"a = '\x80'"])
+def test_a_file_that_is_not_utf_8_is_refused(tmp_path, content):
+    path = tmp_path / "a.toml"
+    path.write_bytes(content)
+    with pytest.raises(ConfigError, match="expected a readable TOML file in UTF-8"):
+        load(path)
+
+
+# -- typos -----------------------------------------------------------------------------------------
+
+
+@st.composite
+def typos(draw) -> tuple[str, str, str]:
+    """Return a table, a key of it, and the key with one slip of the finger."""
+    table, key = draw(st.sampled_from(KEYS))
+    at = draw(st.integers(0, len(key) - 2))
+    slip = draw(st.sampled_from(["drop", "double", "swap"]))
+    typed = {
+        "drop": key[:at] + key[at + 1 :],
+        "double": key[: at + 1] + key[at:],
+        "swap": key[:at] + key[at + 1] + key[at] + key[at + 2 :],
+    }[slip]
+    return table, key, typed
+
+
+@settings(deadline=None, max_examples=150, derandomize=True)
+@given(typos())
+def test_a_slip_of_the_finger_is_refused_with_the_key_that_was_meant(typo):
+    table, key, typed = typo
+    known = TABLES[table].model_fields
+    if typed in known:
+        return
+    content = tomllib.loads(WHOLE)
+    inner = content
+    for part in table.split("."):
+        inner = inner.setdefault(part, {})
+    inner[typed] = 1
+    told = [line for line in problems(content) if f"{table}.{typed}: unknown key" in line]
+    assert len(told) == 1
+    assert re.search(rf"(did you mean '|: ){key}\b", told[0].partition("unknown key")[2]), told
+
+
+@settings(deadline=None, max_examples=100, derandomize=True)
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+        lambda inner: (
+            st.lists(inner, max_size=3)
+            | st.dictionaries(
+                st.sampled_from(["loops", "boards", "tank", "sensor", "kind", "setpoint_c", "x"]),
+                inner,
+                max_size=4,
+            )
+        ),
+        max_leaves=12,
+    )
+)
+def test_no_content_whatever_raises_anything_but_a_config_error(value):
+    content = value if isinstance(value, dict) else {"loops": value}
+    try:
+        load(content)
+    except ConfigError as error:
+        assert str(error)
+
+
+# -- who may write it ------------------------------------------------------------------------------
+
+
+def test_a_private_file_is_exposed_to_nobody(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text(WHOLE)
+    path.chmod(0o644)
+    assert exposures([path]) == []
+
+
+@pytest.mark.parametrize(("mode", "whose"), [(0o664, "group"), (0o646, "everybody")])
+def test_a_file_that_others_may_write_to_is_told(tmp_path, mode, whose):
+    path = tmp_path / "a.toml"
+    path.write_text(WHOLE)
+    path.chmod(mode)
+    [told] = exposures([path])
+    assert whose in told
+    assert f"chmod go-w {path}" in told
+
+
+def test_a_file_in_a_folder_that_is_open_to_everybody_is_told(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text(WHOLE)
+    path.chmod(0o644)
+    tmp_path.chmod(0o777)
+    assert "everybody may replace it" in exposures([path])[0]
+    tmp_path.chmod(0o1777)  # the sticky bit keeps others from replacing it
+    assert exposures([path]) == []
+
+
+def test_root_does_not_obey_a_file_that_everybody_may_write_to(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text(WHOLE)
+    path.chmod(0o666)
+    if os.geteuid() != 0:
+        assert load(path) == load(tomllib.loads(WHOLE))
+        return
+    with pytest.raises(ConfigError, match="only its owner may write to, got mode 0666"):
+        load(path)
