@@ -240,7 +240,11 @@ def _readable(path: Path) -> Iterator[sqlite3.Connection]:
 
 def _run(connection: sqlite3.Connection, number: int) -> RunInfo:
     query = "SELECT version, configuration, started_utc_s FROM runs WHERE id = ?"
-    return RunInfo(*connection.execute(query, (number,)).fetchone())
+    version, configuration, started_utc_s = connection.execute(query, (number,)).fetchone()
+    try:
+        return RunInfo(version, configuration, started_utc_s)
+    except ValueError as error:
+        raise Unavailable(f"the configuration of run {number} is no JSON: {error}") from error
 
 
 def _clock_steps(connection: sqlite3.Connection, number: int) -> list[tuple[float, float]]:

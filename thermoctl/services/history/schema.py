@@ -51,7 +51,7 @@ class RunInfo:
     started_utc_s: float | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(json.loads(self.configuration), dict):
+        if type(json.loads(self.configuration)) is not dict:
             raise ValueError(f"configuration must be a JSON object, got {self.configuration!r}")
 
 
