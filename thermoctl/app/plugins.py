@@ -63,9 +63,10 @@ def find(group: str, kind: str) -> Any:
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return words that offer what was probably meant by `name`."""
     names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    if close:
-        return f"; did you mean {close[0]!r}?"
+    close = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
+    if close:  # the likest, but above all one with the same letters: swapped ones are common
+        meant = max(close, key=lambda each: sorted(each) == sorted(name))
+        return f"; did you mean {meant!r}?"
     return f"; known: {', '.join(names)}" if names else ""
 
 

@@ -64,6 +64,7 @@ def other_unit(key: str, value: Any, known: Iterable[str]) -> str:
     if right is None:
         return ""
     hint = f"; the unit here is {unit_of(right)}: {right}"
-    if unit in meant and convert is not None and is_finite_number(value):
+    is_rate = stem.endswith("_per")  # its unit divides, and is left to the reader
+    if unit in meant and convert is not None and not is_rate and is_finite_number(value):
         hint += f" = {convert(float(value)):.6g}"
     return hint
