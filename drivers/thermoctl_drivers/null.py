@@ -48,7 +48,7 @@ class NullSettings(BaseModel):
 
 
 class NullBoard:
-    """One input that stands still, or follows `inject`; one output that goes nowhere.
+    """Dry run: one input that stands still, or follows `inject`; an output that goes nowhere.
 
     Parameters
     ----------

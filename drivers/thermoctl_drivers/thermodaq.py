@@ -77,7 +77,7 @@ class ThermoDaqSettings(BaseModel):
 
 
 class ThermoDaq:
-    """One thermodaq board behind a link.
+    """thermodaq: LM335 in, heater out, with a dead-man; an Arduino Uno on a serial port.
 
     Parameters
     ----------
