@@ -75,7 +75,7 @@ def test_every_public_docstring_begins_with_one_short_sentence():
         for name, first in first_lines(path).items()
         if not (first.endswith(".") and len(first) < SENTENCE)
     ]
-    assert wrong == []
+    assert not wrong, "\n".join([f"{len(wrong)} first lines:", *wrong])
 
 
 def test_no_file_names_the_home_of_somebody():
