@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import signal
 import sys
 import time
@@ -67,7 +68,7 @@ def run_bench(settings: Settings, options: BenchOptions) -> None:
         summary = Summary()
         sinks.append(summary.add)
         if options.as_json:
-            sinks.append(_json_lines(flush=math.isfinite(options.speed)))
+            sinks.append(_json_lines(loop, flush=math.isfinite(options.speed)))
         else:
             view = stack.enter_context(_LiveBench.on_terminal(settings, loop, clock, options))
             sinks.append(view.take)
@@ -97,13 +98,18 @@ def _tell(summary: Summary, options: BenchOptions) -> None:
     click.echo(words, err=True)
 
 
-def _json_lines(*, flush: bool) -> Callable[[Cycle], None]:
-    write = sys.stdout.write
+def _json_lines(loop: Loop, *, flush: bool) -> Callable[[Cycle], None]:
+    """Write a line a cycle; when nobody reads any more there is nothing left to run for."""
 
     def sink(cycle: Cycle) -> None:
-        write(as_line(cycle) + "\n")
-        if flush:
-            sys.stdout.flush()
+        try:
+            sys.stdout.write(as_line(cycle) + "\n")
+            if flush:
+                sys.stdout.flush()
+        except BrokenPipeError:
+            # What is still buffered goes nowhere, so that the exit stays silent too.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            loop.stop()
 
     return sink
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib
 import json
 import math
-import os
 import sys
 from pathlib import Path
 from typing import Any, Final
@@ -127,10 +126,6 @@ def main(arguments: list[str] | None = None) -> None:
     except click.Abort:
         click.echo("thermoctl: interrupted", err=True)
         code = 130
-    except BrokenPipeError:
-        # Whoever read us has gone; the descriptor is replaced so that the exit stays silent too.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 0
     except (ThermoctlError, OSError) as error:
         code = exit_code_of(error)
         _tell(error, code, arguments)

@@ -164,15 +164,10 @@ class Loop:
         for wiring, step, tick_us in steps:
             if events:
                 step = replace(step, events=(*step.events, *events))
-            self._publish(
+            truth = _truth(wiring.sensor_board)
+            self._hand_out(
                 Cycle(
-                    wiring.name,
-                    step,
-                    accepted[wiring.name],
-                    tick_us,
-                    late_s,
-                    self.missed,
-                    _truth(wiring.sensor_board),
+                    wiring.name, step, accepted[wiring.name], tick_us, late_s, self.missed, truth
                 )
             )
 
@@ -230,6 +225,17 @@ class Loop:
             except DriverError:
                 confirmed = False  # said by the caller; the board's dead-man does the rest
         return confirmed
+
+    def _hand_out(self, cycle: Cycle) -> None:
+        """Publish `cycle`; a reader that fails is told of, and steers nothing."""
+        try:
+            self._publish(cycle)
+        except Exception as error:  # noqa: BLE001 - readers may fail in any way
+            self.report(
+                "feed.failed",
+                error=f"{type(error).__name__}: {error}",
+                trace=traceback.format_exc(),
+            )
 
     # -- small things ----------------------------------------------------------------------------
 

@@ -27,6 +27,7 @@ _BY_LEVEL: Final = {
         "config.refused",
         "controller.failed",
         "cycle.failed",
+        "feed.failed",
         "estimator.failed",
         "output.nan",
         "output.readback",

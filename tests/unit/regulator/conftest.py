@@ -1,7 +1,7 @@
 """A regulator on a small plant with lag, driven second by second."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -65,10 +65,10 @@ def drive_with() -> Callable[..., Drive]:
 
 
 @pytest.fixture
-def warm(drive_with: Callable[..., Drive]) -> Iterator[Drive]:
+def warm(drive_with: Callable[..., Drive]) -> Drive:
     """A regulator that has held its set point for five minutes."""
     drive = drive_with()
     drive.run(300)
     assert drive.steps[-1].state is State.RUN
     assert 0.05 < drive.power < 0.6
-    yield drive
+    return drive

@@ -1,5 +1,6 @@
 """The loop on scripted boards and a manual clock: deadlines, failures, and power 0 at every end."""
 
+import itertools
 import math
 
 import pytest
@@ -104,7 +105,7 @@ def test_missed_deadlines_are_counted_and_never_caught_up():
     bench = Bench(board)
     bench.run(30)
     starts = [cycle.step.t_s for cycle in bench.cycles]
-    assert all(later - earlier >= 1.0 for earlier, later in zip(starts, starts[1:], strict=False))
+    assert all(later - earlier >= 1.0 for earlier, later in itertools.pairwise(starts))
     assert bench.loop.missed > 0
     assert "cycle.missed" in bench.events()
     assert bench.completed == len(bench.cycles)
@@ -184,6 +185,21 @@ def test_requests_are_read_at_the_top_of_a_cycle_and_a_refusal_is_told():
     assert last.step.mode is Mode.OFF
     assert last.step.command.power == 0.0
     assert "request.refused" in bench.events()
+
+
+def test_a_reader_that_fails_is_told_of_and_steers_nothing():
+    bench = Bench(scripted())
+    keep = bench.loop._publish
+
+    def fail_once(cycle):
+        bench.loop._publish = keep
+        raise OSError("disk full")
+
+    bench.loop._publish = fail_once
+    last = bench.run(3)
+    assert "feed.failed" in bench.events()
+    assert last.step.command.power == 1.0
+    assert bench.completed == 3
 
 
 def test_a_reader_that_stops_the_loop_ends_it_within_the_cycle():
