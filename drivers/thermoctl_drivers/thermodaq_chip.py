@@ -7,6 +7,7 @@ they cannot be built, `thermoctl_drivers.thermodaq_board` does the same without 
 from __future__ import annotations
 
 import ctypes
+import fcntl
 import shutil
 import subprocess
 from functools import cache
@@ -35,17 +36,24 @@ def build() -> Path:
     for tool, package in (("make", "make"), ("avr-gcc", "gcc-avr avr-libc"), ("cc", "gcc")):
         if shutil.which(tool) is None:
             raise Unavailable(f"expected {tool}, it is not installed (Debian: {package})")
-    done = subprocess.run(
-        ["make", "-C", str(FIRMWARE), "all", "sim"],
-        capture_output=True,
-        text=True,
-        timeout=_BUILD_S,
-        check=False,
-    )
+    target = FIRMWARE / "build"
+    try:
+        target.mkdir(exist_ok=True)
+        with (target / "lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)  # test workers build one after the other
+            done = subprocess.run(
+                ["make", "-C", str(FIRMWARE), "all", "sim"],
+                capture_output=True,
+                text=True,
+                timeout=_BUILD_S,
+                check=False,
+            )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise Unavailable(f"the chip simulator does not build: {error}") from error
     if done.returncode != 0:
         last = (done.stderr.strip().splitlines() or ["make failed"])[-1]
         raise Unavailable(f"the chip simulator does not build (Debian: libsimavr-dev): {last}")
-    return FIRMWARE / "build"
+    return target
 
 
 @cache

@@ -213,3 +213,16 @@ def test_the_driver_holds_a_tank_through_the_firmware(
 @pytest.mark.slow
 def test_two_runs_in_lock_step_are_identical(chip: Chip) -> None:
     assert closed_loop(30, Chip(seed=5)) == closed_loop(30, Chip(seed=5))
+
+
+def test_the_gate_closes_before_every_crossing_whatever_is_commanded_meanwhile(chip: Chip) -> None:
+    chip.crossings(50.0)
+    configure(chip, mode=1, power=5_000)
+    closed_at_s = set()
+    for turn in range(300):
+        power = 1_000 if turn % 2 else 9_900
+        chip.send(frames.request(turn & 0xFF, "W", power, 10_000))
+        chip.advance(0.0073)
+        closed_at_s.add(round(chip.off_since_s % 0.01, 4))
+    assert chip.on_s > 0.2
+    assert max(closed_at_s) - min(closed_at_s) <= 0.0001

@@ -35,6 +35,7 @@ static volatile uint8_t cut = CUT_RESET;
 static uint16_t accumulator; /* Bresenham over cycles */
 static uint16_t fire_delay;  /* phase angle: from the crossing to the gate; 0: stay off */
 static uint16_t gate_left;   /* until the gate changes, beyond the stretch that is running */
+static uint16_t gate_delay;  /* of this half wave: a new command must not move its end */
 static bool gate_open;
 static uint8_t ticks;        /* of the internal time base, within one cycle */
 static uint8_t quiet_ticks;  /* since the last crossing, saturating */
@@ -221,8 +222,9 @@ ISR(INT0_vect)
     }
     pin_off();
     gate_open = false;
-    if (fire_delay != 0)
-        gate_timer_start(fire_delay);
+    gate_delay = fire_delay;
+    if (gate_delay != 0)
+        gate_timer_start(gate_delay);
     else
         gate_timer_stop();
 }
@@ -234,7 +236,7 @@ ISR(TIMER2_COMPA_vect)
     } else if (!gate_open && power != 0) {
         gate_open = true;
         pin_on();
-        gate_timer_start(half_wave - (uint16_t)GATE_MARGIN - fire_delay);
+        gate_timer_start(half_wave - (uint16_t)GATE_MARGIN - gate_delay);
     } else {
         pin_off();
         gate_timer_stop();
