@@ -111,7 +111,7 @@ def _cell(value: Any) -> str:
 def doctor(
     ctx: click.Context, configs: tuple[Path, ...], state: Path | None, as_json: bool
 ) -> None:
-    """Look at ports, rights, boards, clock and service, and say what to do; never heats."""
+    """Look at ports, boards, clock and service, and say what to do; never heats."""
     from thermoctl.app.doctor import FAIL, examine
 
     findings = examine(list(configs), state)

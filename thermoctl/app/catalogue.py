@@ -1,4 +1,4 @@
-"""What can be configured: every table and every kind, with type, unit, bounds, default and text.
+"""What can be configured: type, unit, bounds, default and text of every key.
 
 Drawn from the settings models and from the signatures and docstrings of the laws, so that what is
 listed is what is accepted.
@@ -70,7 +70,7 @@ def rows_of_law(law: type) -> list[Row]:
 
 
 def option_schemas(law: type) -> dict[str, dict[str, Any]]:
-    """Return the JSON schema of each option of a law, with its default and its docstring's text."""
+    """Return the JSON schema of each option of a law, documented as in its docstring."""
     texts, hints = parameter_texts(law), get_type_hints(law)
     schemas = {}
     for field in dataclasses.fields(law):
@@ -105,7 +105,7 @@ def first_line(documented: Any) -> str:
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON schema of a configuration, installed kinds and their options included."""
+    """Return the JSON schema of a configuration, with all kinds and their options."""
     whole = Settings.model_json_schema()
     definitions = whole["$defs"]
     boards = [_board_schema(kind, definitions) for kind in plugins.kinds(plugins.DRIVERS)]
@@ -176,13 +176,14 @@ def _row(key: str, field: Mapping[str, Any], definitions: Any, required: bool) -
     kinds = [_resolved(each, definitions) for each in field.get("anyOf", (field,))]
     kinds = [each for each in kinds if each.get("type") != "null"]
     default = field.get("default")
+    text = str(field.get("description") or kinds[0].get("description", ""))
     return Row(
         key=key,
         type=" or ".join(dict.fromkeys(_type(each) for each in kinds)),
         unit=unit_of(key),
         bounds=", ".join(dict.fromkeys(b for each in kinds for b in _bounds(each))),
         default="required" if required else _default(default),
-        text=str(field.get("description", "")),
+        text=text,
     )
 
 
@@ -204,7 +205,8 @@ def _type(field: Mapping[str, Any]) -> str:
     if "const" in field:
         return toml_value(field["const"])
     if "enum" in field:
-        return " or ".join(map(toml_value, field["enum"]))
+        *others, last = map(toml_value, field["enum"])
+        return f"{', '.join(others)} or {last}" if others else last
     return _WORDS.get(str(field.get("type")), "table")
 
 

@@ -1,4 +1,4 @@
-"""Puts the rooms together: from settings to a regulator, or to a loop with its boards.
+"""Puts the rooms together: from settings to a regulator, or a loop with boards.
 
 The only place that knows which class stands behind a port, and where boards are built.
 """
@@ -64,9 +64,10 @@ def driver_of(settings: BaseModel) -> Any:
 
 
 def board_builder(settings: BaseModel, clock: Clock) -> Callable[[], Board]:
-    """Return a function that builds the board of `settings` anew, its link opened but not used.
+    """Return a function that builds the board of `settings` anew.
 
-    A board is built again after every loss, because a device that comes back is a new one.
+    Its link is opened, but not used. A board is built again after every loss, because a device
+    that comes back is a new one.
     """
     driver = driver_of(settings)
 
@@ -134,7 +135,7 @@ def loop_for(
 
 
 def wiring_errors(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield the key and a sentence for everything that keeps these loops from running together.
+    """Yield key and reason for all that keeps these loops from running together.
 
     Such a configuration may still be studied, or run on simulated boards; nothing is opened here.
     """
@@ -188,7 +189,7 @@ def _wiring(
 
 
 def started_as(settings: Settings, starts: Mapping[str, tuple[Mode, float]]) -> Settings:
-    """Return `settings` with the given loops starting in another mode and at another set point."""
+    """Return `settings` with some loops starting in another mode and set point."""
     loops = dict(settings.loops)
     for name, (mode, setpoint_c) in starts.items():
         loops[name] = loops[name].model_copy(update={"mode": mode, "setpoint_c": setpoint_c})

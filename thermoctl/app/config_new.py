@@ -1,4 +1,4 @@
-"""``thermoctl config new``: a few questions, and a commented configuration that loads."""
+"""``thermoctl config new``: a few questions, then a commented configuration."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _TAKEN = "expected a file that is not there yet, got {}; --force replaces it"
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What a configuration is made of; a port or a pull-up is None where there is none."""
+    """What a configuration is made of; a port or pull-up may be None."""
 
     kind: str
     port: str | None

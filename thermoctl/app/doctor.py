@@ -113,7 +113,7 @@ def _ports(settings: Settings | None) -> list[Finding]:
 def boards(
     settings: Settings, directory: Path, clock: Clock, patience_s: float = BOARD_S
 ) -> list[Finding]:
-    """Return what each board says, asked side by side; skipped where a daemon has them."""
+    """Return what each board says, all asked at once; none while a daemon runs."""
     holder = ports.daemon_holding(directory)
     if holder is not None:
         text = f"not asked: the daemon is running (process {holder})"
@@ -232,7 +232,7 @@ def _no_temperature(name: str, loop: str, samples: dict[str, RawSample]) -> str:
 
 
 def state_folder(directory: Path) -> Finding:
-    """Return whether latches and history can be stored in `directory`; nothing is made."""
+    """Return whether `directory` can hold latches and history; nothing is made."""
     there = directory
     while not there.exists() and there != there.parent:
         there = there.parent

@@ -1,4 +1,4 @@
-"""Configuration files as they are written: content, lines, and what is wrong with them.
+"""Configuration files as written: content, lines, and what is wrong with them.
 
 The rule on rights: whoever may write a configuration decides what heats. One that everybody may
 write to is refused when root reads it; one that anybody else than root and the reading user may
@@ -26,7 +26,7 @@ _AT_LINE = re.compile(r"\s*\(at line (?P<line>\d+), column (?P<column>\d+)\)")
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing that is wrong: where it stands, under which key, and what was expected."""
+    """One thing that is wrong: its place, its key, and what was expected."""
 
     file: str
     line: int | None
@@ -76,7 +76,7 @@ class Document:
     lines: Mapping[str, dict[KeyPath, int]] = field(default_factory=dict)
 
     def problem(self, key: KeyPath, text: str) -> Problem:
-        """Return a problem with `key`, placed where the key or its nearest table is written."""
+        """Return a problem with `key`, placed at the line of it or its nearest table."""
         for depth in range(len(key), 0, -1):
             for file, found in self.lines.items():
                 if key[:depth] in found:

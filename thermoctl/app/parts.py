@@ -1,4 +1,4 @@
-"""From the tables of a loop to the parts they describe: limits, model, laws, sensor, actuator.
+"""From the tables of a loop to its limits, model, laws, sensor and actuator.
 
 Pure: nothing is opened and no clock is read, so a configuration is tried out by building it.
 """
@@ -45,7 +45,7 @@ def plan_for(table: LoopTable) -> Plan:
 
 
 def check_parts(table: LoopTable) -> None:
-    """Build every part of a loop once; raise `BadOption` where a table does not describe one."""
+    """Build every part of a loop once; raise `BadOption` where that fails."""
     plan_for(table)
     if table.sensor is not None:
         sensor_for(table.sensor)

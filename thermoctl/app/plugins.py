@@ -1,4 +1,4 @@
-"""Finds drivers, controllers and estimators by entry point, and builds laws from their options.
+"""Finds drivers and laws by entry point, and builds laws from their options.
 
 A third party adds one by declaring it in its own package; only the kind that a configuration names
 is loaded.
@@ -71,7 +71,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def option_names(law: type, injected: Iterable[str] = ()) -> tuple[str, ...]:
-    """Return the names of the options of a frozen law, without those the composer fills in."""
+    """Return the names of a frozen law's options, without those in `injected`."""
     return tuple(
         field.name
         for field in dataclasses.fields(law)
@@ -80,7 +80,7 @@ def option_names(law: type, injected: Iterable[str] = ()) -> tuple[str, ...]:
 
 
 def build(law: type, options: Mapping[str, Any], **injected: Any) -> Any:
-    """Return ``law(**options, **injected)``, with unknown, ill-typed and bad options refused.
+    """Return ``law(**options, **injected)``, after checking the options.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def build(law: type, options: Mapping[str, Any], **injected: Any) -> Any:
 
 
 def blamed(error: Exception, known: Iterable[str]) -> BadOption:
-    """Return `error` as a `BadOption` under the key its text begins with, if that is a known one.
+    """Return `error` as a `BadOption` of the key its text begins with, if known.
 
     The constructors of laws name their argument first: ``R2 must be positive, got -1``.
     """

@@ -1,4 +1,4 @@
-"""Serial ports as this machine has them: which there are, who may use one and who does."""
+"""Serial ports of this machine: which there are, who may use one, who does."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SERVICE_RUN: Final = Path("/run/thermoctl")
 
 
 def serial_ports() -> list[str]:
-    """Return the serial ports of the machine, with what is plugged in where that is known."""
+    """Return the serial ports, each with what is plugged in if that is known."""
     return [
         f"{port.device} ({port.description})" if port.vid is not None else port.device
         for port in sorted(list_ports.comports())
@@ -26,7 +26,7 @@ def serial_ports() -> list[str]:
 
 
 def obstacle(port: str) -> str | None:
-    """Return why `port` cannot be used now and what to do, or None; a URL is left to its driver."""
+    """Return why `port` cannot be used and what to do, or None; None for a URL."""
     if "://" in port:
         return None
     if not os.path.exists(port):
@@ -41,7 +41,7 @@ def obstacle(port: str) -> str | None:
 
 
 def daemon_holding(directory: Path) -> str | None:
-    """Return the process id of the daemon that runs on the state folder, or as the service."""
+    """Return the process id of a daemon on this state folder or the service's."""
     for each in (directory, SERVICE_STATE):
         holder = holder_of(each / "daemon.lock")
         if holder is not None:
@@ -50,7 +50,7 @@ def daemon_holding(directory: Path) -> str | None:
 
 
 def holder_of(lock: Path) -> str | None:
-    """Return the process id in a lock file that is held, None when it is free; takes nothing."""
+    """Return the process id in a lock that is held, or None; takes nothing."""
     try:
         descriptor = os.open(lock, os.O_RDONLY | os.O_NOFOLLOW)
     except OSError:

@@ -1,4 +1,4 @@
-"""Reads a configuration: TOML in, typed and frozen `Settings` out, or one clear `ConfigError`.
+"""Reads a configuration: TOML in, frozen `Settings` or a `ConfigError` out.
 
 Nothing here switches anything on: a configuration is read, checked as a whole and only then used.
 """
@@ -46,12 +46,12 @@ class Settings(Table):
         return plain
 
     def as_json(self) -> str:
-        """Return the configuration in force as JSON, always the same for the same settings."""
+        """Return the configuration in force as JSON, equal for equal settings."""
         return json.dumps(self.in_force(), sort_keys=True)
 
 
 def load(source: str | Path | Mapping[str, Any]) -> Settings:
-    """Return the settings in `source`: the path of a TOML file, or its content as a dict.
+    """Return the settings in `source`: a TOML file's path, or its content as a dict.
 
     Raises
     ------
@@ -65,12 +65,15 @@ def load(source: str | Path | Mapping[str, Any]) -> Settings:
 
 
 def load_all(paths: Iterable[str | Path]) -> Settings:
-    """Return the settings of several files taken together; a name may stand in only one of them."""
+    """Return the settings of several files together; raise as `load` does.
+
+    A loop or board, or a key of another table, may stand in only one of them.
+    """
     return settings_in(read_document(Path(path) for path in paths))
 
 
 def default_files() -> list[Path]:
-    """Return the configuration files of the machine; raise `ConfigError` if there are none."""
+    """Return the machine's configuration files; raise `ConfigError` if none."""
     files = sorted(ETC.glob("*.toml"))
     if not files:
         raise ConfigError(f"expected -c FILE or a configuration {ETC}/*.toml, found none")
@@ -78,7 +81,7 @@ def default_files() -> list[Path]:
 
 
 def settings_in(document: Document) -> Settings:
-    """Return the settings in `document`; raise `BadConfiguration` with all that is wrong."""
+    """Return the settings in `document`; raise `BadConfiguration` with all errors."""
     return _Reading(document).settings()
 
 

@@ -1,4 +1,4 @@
-"""The tables of a configuration: typed, with units in the names, unknown keys refused."""
+"""The tables of a configuration: typed, units in names, unknown keys refused."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class GuardsTable(Table):
 
 
 class EstimatorTable(Options):
-    """Table ``[loops.NAME.estimator]``: the law that learns the model; other keys are its own."""
+    """Table ``[loops.NAME.estimator]``: the law that learns the model."""
 
     kind: str = Field("ckf", description="ckf, nkf, rls, vff, or one from a plug-in.")
     P0: Positive = Field(1.0, description="Variance of the parameters at the start.")

@@ -37,7 +37,7 @@ def places(text: str) -> dict[Path, int]:
 
 
 def line_of(found: dict[Path, int], path: Path) -> int | None:
-    """Return the line of `path`, or of the nearest table around it that is written down."""
+    """Return the line of `path`, or of the nearest table written around it."""
     while path:
         if path in found:
             return found[path]

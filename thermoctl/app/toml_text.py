@@ -1,4 +1,4 @@
-"""Writes a configuration as TOML: tables, text, numbers, true, false and lists; nothing else."""
+"""Writes a configuration as TOML: tables, text, numbers, booleans and lists."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def toml_text(content: Mapping[str, Any]) -> str:
 
 
 def toml_value(value: Any) -> str:
-    """Return one value that is no table as TOML; raise TypeError where there is no such value."""
+    """Return one value that is no table as TOML; raise TypeError if it has none."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

@@ -1,4 +1,4 @@
-"""The units that keys wear at their end, and what a key in another unit was meant to be."""
+"""The units that keys wear, and what a key in another unit was meant to be."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _OTHER: Final[dict[str, tuple[str, Callable[[float], float]]]] = {
 
 
 def unit_of(key: str) -> str:
-    """Return the unit that `key` wears, such as ``°C`` for ``setpoint_c``; "" if it wears none."""
+    """Return the unit that `key` wears, as ``°C`` for ``setpoint_c``, else ""."""
     parts = key.lower().split("_")
     for start in range(len(parts)):
         unit = _UNITS.get("_".join(parts[start:]))
@@ -51,9 +51,9 @@ def unit_of(key: str) -> str:
 
 
 def other_unit(key: str, value: Any, known: Iterable[str]) -> str:
-    """Return a hint when `key` is one of `known` in another unit, with its value converted.
+    """Return a hint when `key` is one of `known` in another unit, else "".
 
-    Returns "" when it is not.
+    The hint gives the value in the right unit, where it can be converted.
     """
     stem, _, worn = key.rpartition("_")
     meant = {each.rpartition("_")[2]: each for each in known if each.rpartition("_")[0] == stem}

@@ -54,7 +54,7 @@ def validated(model: type[BaseModel], table: Any) -> BaseModel:
 
 
 def reasons(error: ValidationError, model: type[BaseModel]) -> list[tuple[KeyPath, str]]:
-    """Return a path below `model` and a sentence for everything that `error` reproaches."""
+    """Return a path below `model` and a sentence for each complaint of `error`."""
     told = []
     for each in error.errors(include_url=False):
         path = tuple(str(part) for part in each["loc"])
@@ -72,13 +72,13 @@ def without_unknown_keys(error: ValidationError, table: Any) -> Any:
 
 
 def unknown_key(key: str, known: Iterable[str], value: Any = None) -> str:
-    """Return a sentence about a `key` that is none, with the one that was probably meant."""
+    """Return a sentence about an unknown `key`, with the one probably meant."""
     names = list(known)
     return f"unknown key{other_unit(key, value, names) or nearest(key, names)}"
 
 
 def shown(value: Any) -> str:
-    """Return `value` as an error shows it: as it is written in TOML, and not endlessly long."""
+    """Return `value` as an error shows it: as written, and not endlessly long."""
     try:
         words = json.dumps(value, default=str, ensure_ascii=False)
     except ValueError:
@@ -87,7 +87,7 @@ def shown(value: Any) -> str:
 
 
 def known_keys(model: type[BaseModel], path: KeyPath) -> list[str]:
-    """Return the keys of the table at `path` below `model`, by walking the annotations."""
+    """Return the keys of the table at `path` below `model`."""
     annotation: Any = model
     for part in path:
         inner = table_in(annotation)
@@ -101,7 +101,7 @@ def known_keys(model: type[BaseModel], path: KeyPath) -> list[str]:
 
 
 def table_in(annotation: Any) -> type[BaseModel] | None:
-    """Return the model inside an annotation such as ``dict[str, Model]`` or ``Model | None``."""
+    """Return the model inside an annotation, such as ``dict[str, Model]``."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next((found for each in get_args(annotation) if (found := table_in(each))), None)

@@ -289,8 +289,7 @@ def test_the_settings_of_a_kind_are_shown_with_bounds_and_defaults(run):
     assert "number, s" in rows["dead_man_s"]
     assert "≥ 0.2, ≤ 10" in rows["dead_man_s"]
     assert " 2.5 " in rows["dead_man_s"]
-    texts = [line.find("The board cuts the heater") for line in (rows["dead_man_s"],)]
-    assert texts == [rows["port"].find("Serial device")]
+    assert rows["dead_man_s"].find("The board cuts") == rows["port"].find("Serial device") > 0
 
 
 def test_the_settings_of_an_unknown_kind_are_a_wrong_use(run):

@@ -1,0 +1,53 @@
+"""Fill the tables of docs/configuration.md from the program's own settings.
+
+Run as ``python docs/make_configuration.py``. A line ``<!-- table: NAME -->`` begins a table and
+``<!-- end -->`` ends it; NAME is that of a settings class, ``driver KIND``, ``controller KIND`` or
+``estimator KIND``.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from thermoctl.app import plugins, tables
+from thermoctl.app.catalogue import Row, rows_of_law, rows_of_model
+
+PAGE = Path(__file__).parent / "configuration.md"
+MARKED = re.compile(
+    r"(?P<begin><!-- table: (?P<name>[\w -]+) -->\n).*?(?P<end><!-- end -->)", re.DOTALL
+)
+HEAD = "| key | type | range | default | meaning |\n|---|---|---|---|---|\n"
+
+
+def rows(name: str) -> list[Row]:
+    """Return the rows of the table called `name`."""
+    what, _, kind = name.partition(" ")
+    if what == "driver":
+        settings = rows_of_model(plugins.find(plugins.DRIVERS, kind).Settings)
+        return [row for row in settings if row.key != "kind"]
+    if what in ("controller", "estimator"):
+        return rows_of_law(plugins.find(f"thermoctl.{what}s", kind))
+    return rows_of_model(getattr(tables, name))
+
+
+def table(name: str) -> str:
+    """Return the table called `name` as Markdown."""
+    return "\n" + HEAD + "".join(f"{line(row)}\n" for row in rows(name)) + "\n"
+
+
+def line(row: Row) -> str:
+    """Return one key as a row of a Markdown table."""
+    kind = f"{row.type}, {row.unit}" if row.unit else row.type
+    default = f"`{row.default}`" if row.default not in ("", "required") else row.default
+    text = row.text.replace("``", "`").replace("|", "\\|")
+    return f"| `{row.key}` | {kind} | {row.bounds} | {default} | {text} |"
+
+
+def filled(page: str) -> str:
+    """Return `page` with every marked table written anew."""
+    return MARKED.sub(lambda mark: mark["begin"] + table(mark["name"]) + mark["end"], page)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
