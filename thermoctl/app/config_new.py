@@ -190,7 +190,8 @@ def _loop_lines(answers: Answers) -> list[str]:
         "",
         "[loops.tank.estimator]",
         _line("kind", "ckf", "the corrected Kalman filter"),
-        _line("R2", 0.01, "K^2, where the estimate of the noise starts"),
+        _line("R1", 1e-8, "lets the pole follow a loss that changes over minutes"),
+        _line("R2", 0.1, "K^2; well above the noise, for the lag that the model does not have"),
     ]
 
 

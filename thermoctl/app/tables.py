@@ -154,7 +154,11 @@ class LoopTable(Table):
         description="Law in charge in mode auto: a kind, or a table with a kind and its options.",
     )
     model: ModelTable = Field(default_factory=ModelTable)
-    estimator: EstimatorTable = Field(default_factory=EstimatorTable)
+    estimator: EstimatorTable = Field(
+        default_factory=lambda: EstimatorTable.model_validate(
+            {"kind": "ckf", "R1": 1e-8, "R2": 0.1}
+        )
+    )
 
     @field_validator("controller", mode="before")
     @classmethod
