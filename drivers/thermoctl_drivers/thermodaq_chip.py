@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import fcntl
+import os
 import shutil
 import subprocess
 from functools import cache
@@ -19,7 +20,28 @@ FREQUENCY_HZ = 16_000_000
 FIRMWARE = Path(__file__).resolve().parents[1] / "firmware" / "thermodaq"
 
 _BUILD_S = 120.0
+_PROBES = {  # Debian package: what must be able to find the header it brings
+    "gcc-avr avr-libc": ("avr-gcc", "-mmcu=atmega328p", "-include", "avr/io.h"),
+    "gcc libelf-dev": ("cc", "-include", "libelf.h"),
+    "libsimavr-dev": ("cc", "-isystem", "/usr/include/simavr", "-include", "sim_avr.h"),
+}
 _RECEIVE_SIZE = 4096
+
+
+@cache
+def missing() -> str | None:
+    """Return what this machine lacks to simulate the chip, None when everything is there."""
+    if not (FIRMWARE / "Makefile").is_file():
+        return f"expected the firmware's sources in {FIRMWARE}, they are not installed"
+    if shutil.which("make") is None:
+        return "expected make, it is not installed (Debian: make)"
+    for package, probe in _PROBES.items():
+        if shutil.which(probe[0]) is None:
+            return f"expected {probe[0]}, it is not installed (Debian: {package})"
+        command = [*probe, "-E", "-x", "c", os.devnull]
+        if subprocess.run(command, capture_output=True, timeout=_BUILD_S, check=False).returncode:
+            return f"expected {probe[-1]}, it is not installed (Debian: {package})"
+    return None
 
 
 @cache
@@ -29,18 +51,15 @@ def build() -> Path:
     Raises
     ------
     Unavailable
-        Naming what is missing.
+        Naming what is missing, or what make says.
     """
-    if not (FIRMWARE / "Makefile").is_file():
-        raise Unavailable(f"expected the firmware's sources in {FIRMWARE}, they are not installed")
-    for tool, package in (("make", "make"), ("avr-gcc", "gcc-avr avr-libc"), ("cc", "gcc")):
-        if shutil.which(tool) is None:
-            raise Unavailable(f"expected {tool}, it is not installed (Debian: {package})")
+    if why := missing():
+        raise Unavailable(why)
     target = FIRMWARE / "build"
     try:
         target.mkdir(exist_ok=True)
         with (target / "lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)  # test workers build one after the other
+            fcntl.flock(lock, fcntl.LOCK_EX)  # several processes build one after the other
             done = subprocess.run(
                 ["make", "-C", str(FIRMWARE), "all", "sim"],
                 capture_output=True,
@@ -49,10 +68,9 @@ def build() -> Path:
                 check=False,
             )
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise Unavailable(f"the chip simulator does not build: {error}") from error
+        raise Unavailable(f"the firmware does not build: {error}") from error
     if done.returncode != 0:
-        last = (done.stderr.strip().splitlines() or ["make failed"])[-1]
-        raise Unavailable(f"the chip simulator does not build (Debian: libsimavr-dev): {last}")
+        raise Unavailable(f"the firmware does not build: {done.stderr.strip()}")
     return target
 
 

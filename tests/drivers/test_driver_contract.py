@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from thermoctl.errors import Unavailable
 from thermoctl.testing import Device, DriverContract, FaultyLink, LockStepLink, ManualClock, Rig
 from thermoctl_drivers.null import NullBoard, NullSettings
 from thermoctl_drivers.simulated import SimulatedBoard, SimulatedSettings
 from thermoctl_drivers.thermodaq import ThermoDaq, ThermoDaqSettings
 from thermoctl_drivers.thermodaq_board import BoardModel
-from thermoctl_drivers.thermodaq_chip import Chip
+from thermoctl_drivers.thermodaq_chip import Chip, missing
 
 LM335_AT_37_5_C_MV = 3106.5
 OBSERVED_S = 0.04
@@ -42,10 +41,9 @@ class TestThermoDaqOnThePythonBoard(DriverContract):
 @pytest.mark.hil
 class TestThermoDaqOnTheChip(DriverContract):
     def rig(self) -> Rig:
-        try:
-            return thermodaq_rig(Chip())
-        except Unavailable as missing:
-            pytest.skip(str(missing))
+        if why := missing():
+            pytest.skip(why)
+        return thermodaq_rig(Chip())
 
 
 class TestSimulated(DriverContract):

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from thermoctl.errors import Unavailable
-from thermoctl_drivers.thermodaq_chip import Chip
+from thermoctl_drivers.thermodaq_chip import Chip, missing
 
 
 @pytest.fixture
 def chip() -> Chip:
     """Return a chip that has just been powered."""
-    try:
-        board = Chip()
-    except Unavailable as missing:
-        pytest.skip(str(missing))
+    if why := missing():
+        pytest.skip(why)
+    board = Chip()
     board.advance(0.05)
     return board
