@@ -22,6 +22,7 @@ _HEADROOM_K, _LEAST_HEADROOM_K = 20.0, 2.0
 _NEAR_BOILING_C = 95.0
 _CURVES = list(SensorTable.model_json_schema()["properties"]["curve"]["enum"])
 _RESISTIVE = ("pt100", "pt1000", "ntc")
+_POSITIVE = click.FloatRange(min=0.0, min_open=True)
 _TAKEN = "expected a file that is not there yet, got {}; --force replaces it"
 
 
@@ -58,9 +59,9 @@ class Answers:
 @click.option("--kind", help="Kind of the board; `thermoctl drivers` lists them.")
 @click.option("--port", help="Serial device of the board.")
 @click.option("--sensor", type=click.Choice(_CURVES), help="What measures.")
-@click.option("--pull-up-ohm", type=float, help="Resistor a pt100, pt1000 or ntc is read with.")
-@click.option("--volume-l", type=float, help="Water in the tank, in litres.")
-@click.option("--heater-w", type=float, help="Rated power of the heater, in W.")
+@click.option("--pull-up-ohm", type=_POSITIVE, help="Resistor a pt100, pt1000 or ntc is read with.")
+@click.option("--volume-l", type=_POSITIVE, help="Water in the tank, in litres.")
+@click.option("--heater-w", type=_POSITIVE, help="Rated power of the heater, in W.")
 @click.option("--setpoint-c", type=float, help="Temperature to hold, in degC.")
 @click.option("--trip-above-c", type=float, help="Heater off for good above this, in degC.")
 @click.option("--mode", type=click.Choice(["off", "auto"]), help="Mode at the first start.")
@@ -95,7 +96,7 @@ class _Interview:
 
 
 def _answers(interview: _Interview) -> Answers:
-    ask, positive = interview.ask, click.FloatRange(min=0.0, min_open=True)
+    ask = interview.ask
     kinds = list(plugins.kinds(plugins.DRIVERS))
     first = "simulated" if "simulated" in kinds else kinds[0]
     kind = ask("kind", "Board", first, click.Choice(kinds))
@@ -106,9 +107,9 @@ def _answers(interview: _Interview) -> Answers:
     sensor = ask("sensor", "Sensor", "lm335", click.Choice(_CURVES))
     pull_up_ohm = None
     if sensor in _RESISTIVE:
-        pull_up_ohm = ask("pull_up_ohm", "Resistor it is read with, in ohm", 10_000.0, positive)
-    volume_l = ask("volume_l", "Water in the tank, in litres", 8.0, positive)
-    heater_w = ask("heater_w", "Rated power of the heater, in W", 1500.0, positive)
+        pull_up_ohm = ask("pull_up_ohm", "Resistor it is read with, in ohm", 10_000.0, _POSITIVE)
+    volume_l = ask("volume_l", "Water in the tank, in litres", 8.0, _POSITIVE)
+    heater_w = ask("heater_w", "Rated power of the heater, in W", 1500.0, _POSITIVE)
     setpoint_c = ask("setpoint_c", "Temperature to hold, in degC", 37.5, float)
     above = click.FloatRange(min=setpoint_c, min_open=True)
     usual_c = max(min(setpoint_c + _HEADROOM_K, _NEAR_BOILING_C), setpoint_c + _LEAST_HEADROOM_K)

@@ -229,6 +229,14 @@ def test_a_trip_below_the_setpoint_is_asked_again():
     assert load(tomllib.loads(result.stdout)).loops["tank"].trip_above_c == 70.0
 
 
+@pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "much"])
+@pytest.mark.parametrize("option", ["--volume-l", "--heater-w"])
+def test_a_size_that_is_none_is_refused(run, option, value):
+    code, out, _ = run("config", "new", "--yes", option, value)
+    assert code in (2, 78)
+    assert out == ""
+
+
 def test_options_that_contradict_each_other_write_nothing(run, tmp_path):
     path = tmp_path / "new.toml"
     arguments = ("--yes", "--setpoint-c", 60, "--trip-above-c", 50, "-o", path)
