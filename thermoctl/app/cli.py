@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import json
 import math
+import os
 import sys
 from pathlib import Path
 from typing import Any, Final
@@ -116,6 +117,8 @@ def exit_code_of(error: BaseException) -> int:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit; the entry point of the ``thermoctl`` command."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    # Matrices of a few rows gain nothing from threads, which cost memory and disturb deadlines.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         result = cli.main(args=arguments, prog_name="thermoctl", standalone_mode=False)
         code = result if isinstance(result, int) else 0

@@ -85,14 +85,6 @@ class Daemon:
         self._stored: dict[str, RunRecord] = {}
         self._seen = _Seen()
         self._clock = MonotonicClock()
-        self._loop = loop_for(
-            self._resumed(settings),
-            self._clock,
-            self._publish,
-            latched=self._latched(settings),
-            completed=self._completed,
-        )
-        self._keeper = LatchKeeper(self._latches, self._acknowledged_on_disk)
         self._history: HistoryWriter | None = None
         if settings.history.enabled:
             self._history = HistoryWriter(
@@ -100,8 +92,18 @@ class Daemon:
                 RunInfo(__version__, settings.as_json()),
                 report=self._journal.emit,
             )
-        self._confirmed = False
-        self._ready = False
+        self._loop = loop_for(
+            self._resumed(settings),
+            self._clock,
+            self._publish,
+            latched=self._latched(settings),
+            completed=self._completed,
+        )
+        self._keeper = LatchKeeper(
+            self._latches, self._acknowledged_on_disk, report=self._journal.emit
+        )
+        self._confirmed = self._ready = False
+        self._ending = self._reloading = False
 
     # -- starting where the last run ended -------------------------------------------------------
 
@@ -136,7 +138,8 @@ class Daemon:
 
     def run(self) -> bool:
         """Run until a signal ends it; return whether power 0 was confirmed by every board."""
-        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # before any thread inherits the mask
+        for number in SIGNALS:
+            signal.signal(number, self._note_signal)
         with contextlib.ExitStack() as stack:
             for lock in self._locks:
                 stack.enter_context(lock)
@@ -162,19 +165,29 @@ class Daemon:
             self._confirmed = self._loop.shut_down()
 
     def _attend(self, control: threading.Thread) -> None:
-        """Wait for signals until the control thread has ended."""
-        while control.is_alive():
-            received = signal.sigtimedwait(SIGNALS, _TURN_S)
-            if received is not None and received.si_signo == signal.SIGHUP:
+        """Look after signals and the disk until the control thread has ended."""
+        while control.is_alive() and not self._ending:
+            control.join(_TURN_S)
+            if self._reloading:
+                self._reloading = False
                 self._reload()
-            elif received is not None:
-                self._notifier.stopping()
-                self._loop.stop()
-                self._clock.interrupt()
-                control.join(_STOP_S)
-                break
             self._store_runs()
+        self._notifier.stopping()
+        control.join(_STOP_S)
         self._store_runs()
+
+    def _note_signal(self, number: int, frame: object) -> None:
+        """Only set flags: this runs in the middle of whatever the main thread is doing.
+
+        A handler, and not a blocked signal that is waited for: libraries start threads of their
+        own that block nothing, and the kernel would end the process through one of them.
+        """
+        if number == signal.SIGHUP:
+            self._reloading = True
+        else:
+            self._ending = True
+            self._loop.stop()
+            self._clock.interrupt()
 
     def _store_runs(self) -> None:
         for name, cycle in list(self._seen.cycles.items()):
@@ -234,7 +247,10 @@ class Daemon:
         self._notifier.ready()
 
     def _emit(self, name: str, loop: str | None, **fields: object) -> None:
-        self._journal.emit(Event(self._clock.now_s(), name, fields), loop)
+        event = Event(self._clock.now_s(), name, fields)
+        self._journal.emit(event, loop)
+        if self._history is not None:
+            self._history.publish_event(event, loop)
 
 
 def _words(cycle: Cycle) -> str:

@@ -71,12 +71,14 @@ def simulate(settings: Settings, duration_s: float, seed: int | None = None) -> 
     clock = SimulatedClock()
     loop = loop_for(bench_settings(settings, seed), clock, finished.append, beside=False)
     period_s = next(iter(settings.loops.values())).period_s
-    for number in range(int(duration_s / period_s) + 1):
-        clock.sleep_until(number * period_s)
-        loop.cycle(number * period_s)
-        yield from finished
-        finished.clear()
-    loop.shut_down()
+    try:
+        for number in range(int(duration_s / period_s) + 1):
+            clock.sleep_until(number * period_s)
+            loop.cycle(number * period_s)
+            yield from finished
+            finished.clear()
+    finally:
+        loop.shut_down()
 
 
 def _simulated(name: str, board: BaseModel, settings: Settings) -> SimulatedSettings:
