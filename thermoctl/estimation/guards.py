@@ -77,7 +77,7 @@ class Guarded:
         ``3 sqrt(n)`` times the noise. A constant regressor then teaches nothing: leave it off for
         the structure of O21 (27), whose learning of a at rest is its integral action.
     robust_R2 : bool
-        Take R2 from a parallel least squares with forgetting .95: ``(1.4826 median |e|)^2`` over its
+        Take R2 from parallel least squares with forgetting .95: ``(1.4826 median |e|)^2`` over its
         last 60 innovations. For the two Kalman filters.
     R2_min : float, optional
         Least R2 that `robust_R2` may find. Where the model is known to be too simple, as that of
