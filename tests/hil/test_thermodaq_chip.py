@@ -226,3 +226,30 @@ def test_the_gate_closes_before_every_crossing_whatever_is_commanded_meanwhile(c
         closed_at_s.add(round(chip.off_since_s % 0.01, 4))
     assert chip.on_s > 0.2
     assert max(closed_at_s) - min(closed_at_s) <= 0.0001
+
+
+@pytest.mark.parametrize("letter", ["H", "R"])
+def test_a_reply_begins_within_two_milliseconds_of_chip_time(chip: Chip, letter: str) -> None:
+    request = frames.request(1, letter)
+    chip.send(request)
+    chip.advance(len(request) * 10 / 115_200)
+    arrived_s = chip.t_s
+    while not chip.receive():
+        chip.advance(0.0001)
+        assert chip.t_s - arrived_s < 0.002
+
+
+def test_a_flood_of_requests_starves_neither_the_watchdog_nor_the_dead_man(chip: Chip) -> None:
+    configure(chip, mode=0, power=10_000)
+    command(chip, "H")
+    command(chip, "W", 10_000, 1000)
+    sent_s = chip.t_s
+    while chip.t_s < sent_s + 2.0:
+        chip.send(b">00 R*0000\n" + b"\xff" * 1000)
+        chip.advance(0.08)
+    assert chip.off_since_s - sent_s == pytest.approx(1.0, abs=0.03)
+    chip.advance(0.5)
+    chip.receive()
+    state = frames.reading(command(chip, "R"))
+    assert frames.Flag.RESET not in state.flags
+    assert state.cut == frames.Cut.DEAD_MAN

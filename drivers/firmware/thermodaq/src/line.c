@@ -97,10 +97,14 @@ void reply_number(uint32_t value)
 {
     char digits[10];
     uint8_t count = 0;
-    do {
+    for (; value > UINT16_MAX; value /= 10) /* 32-bit division is slow: no more than needed */
         digits[count++] = (char)('0' + value % 10);
-        value /= 10;
-    } while (value != 0);
+    uint16_t rest = (uint16_t)value;
+    do {
+        uint16_t tenth = rest / 10;
+        digits[count++] = (char)('0' + (rest - tenth * 10));
+        rest = tenth;
+    } while (rest != 0);
     put(' ');
     while (count != 0)
         put(digits[--count]);

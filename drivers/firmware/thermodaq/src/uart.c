@@ -18,8 +18,8 @@ static volatile uint8_t tx_head, tx_tail;
 
 void uart_start(void)
 {
+    UCSR0A = _BV(U2X0); /* before the divisor, for simulators that work out the speed there */
     UBRR0 = DIVISOR;
-    UCSR0A = _BV(U2X0);
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
     UCSR0B = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0);
 }
