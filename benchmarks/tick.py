@@ -1,0 +1,62 @@
+"""Time one tick of the regulator, and a simulated hour with plant and JSON lines.
+
+Run with ``python benchmarks/tick.py``. Prints medians with the least and the greatest of several
+runs; these depend on the machine, so nothing is judged by them.
+"""
+
+from __future__ import annotations
+
+import io
+import statistics
+import time
+from collections.abc import Callable
+from contextlib import redirect_stdout
+
+from thermoctl.app.report import as_line
+from thermoctl.app.sim import bench_settings, profile, simulate
+
+RUNS = 5
+HOUR_S = 3600.0
+
+
+def spread(values: list[float]) -> str:
+    """Return the median of `values` with their range."""
+    return f"{statistics.median(values):8.2f}  ({min(values):.2f} to {max(values):.2f})"
+
+
+def ticks_us(name: str) -> list[float]:
+    """Return the median CPU time of a regulator's step in us, once a run."""
+    settings = bench_settings(profile(name))
+    return [
+        statistics.median(cycle.tick_us for cycle in simulate(settings, HOUR_S))
+        for _ in range(RUNS)
+    ]
+
+
+def seconds(work: Callable[[], None]) -> list[float]:
+    """Return the CPU time of `work` in s, once a run."""
+    taken = []
+    for _ in range(RUNS):
+        begin_s = time.process_time()
+        work()
+        taken.append(time.process_time() - begin_s)
+    return taken
+
+
+def hour_with_lines() -> None:
+    """Simulate an hour of the aquarium and write every cycle as JSON."""
+    with redirect_stdout(io.StringIO()):
+        for cycle in simulate(bench_settings(), HOUR_S):
+            print(as_line(cycle))
+
+
+def main() -> None:
+    """Print the table."""
+    print(f"medians of {RUNS} runs, with their range")
+    for name in ("aquarium", "ozbek2021"):
+        print(f"regulator step, {name:<28} us {spread(ticks_us(name))}")
+    print(f"simulated hour with plant and JSON lines   s {spread(seconds(hour_with_lines))}")
+
+
+if __name__ == "__main__":
+    main()
