@@ -20,7 +20,7 @@ from typing import Final
 
 from pydantic import BaseModel
 
-from thermoctl.app import ports
+from thermoctl.app import serial_ports
 from thermoctl.app.compose import board_builder, driver_of
 from thermoctl.app.config_commands import runnable
 from thermoctl.app.daemon import state_for
@@ -98,7 +98,7 @@ def _configuration(files: list[Path]) -> tuple[Settings | None, list[Finding]]:
 
 
 def _ports(settings: Settings | None) -> list[Finding]:
-    found = ports.serial_ports()
+    found = serial_ports.present()
     needed = settings is not None and any(hasattr(b, "port") for b in settings.boards.values())
     status = WARN if needed and not found else OK
     text = ", ".join(found) or "no serial port found"
@@ -114,7 +114,7 @@ def boards(
     settings: Settings, directory: Path, clock: Clock, patience_s: float = BOARD_S
 ) -> list[Finding]:
     """Return what each board says, all asked at once; none while a daemon runs."""
-    holder = ports.daemon_holding(directory)
+    holder = serial_ports.daemon_holding(directory)
     if holder is not None:
         text = f"not asked: the daemon is running (process {holder})"
         return [Finding(OK, f"board {name}", text) for name in settings.boards]
@@ -145,7 +145,7 @@ class _Visit:
     def start(self) -> None:
         """Look at the port, and begin when it is free."""
         port = getattr(self._board, "port", None)
-        obstacle = None if port is None else ports.obstacle(port)
+        obstacle = None if port is None else serial_ports.obstacle(port)
         if obstacle is not None:
             self._found.append(Finding(FAIL, self._check, obstacle))
         else:
@@ -174,7 +174,7 @@ class _Visit:
 
     def _failure(self, text: str) -> Finding:
         port = getattr(self._board, "port", None)
-        user = None if port is None else ports.used_by(port)
+        user = None if port is None else serial_ports.used_by(port)
         advice = "check wiring, supply and kind" if user is None else f"{user}; end it first"
         return Finding(FAIL, self._check, f"{text}; {advice}")
 

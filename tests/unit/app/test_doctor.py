@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from thermoctl.app import ports
+from thermoctl.app import serial_ports
 from thermoctl.app.cli import main
 from thermoctl.app.doctor import FAIL, OK, WARN, boards, examine, service, state_folder, wall_clock
 from thermoctl.app.settings import load
@@ -101,11 +101,11 @@ def pty():
 
 
 def test_a_port_that_is_free_has_no_obstacle(pty):
-    assert ports.obstacle(pty) is None
+    assert serial_ports.obstacle(pty) is None
 
 
 def test_a_port_that_is_not_there_is_an_obstacle(tmp_path):
-    assert "is not there; plug the board in" in (ports.obstacle(str(tmp_path / "no")) or "")
+    assert "is not there; plug the board in" in (serial_ports.obstacle(str(tmp_path / "no")) or "")
 
 
 def test_a_port_without_rights_names_the_group_to_join(tmp_path):
@@ -113,31 +113,31 @@ def test_a_port_without_rights_names_the_group_to_join(tmp_path):
     port.touch()
     port.chmod(0o000)
     if os.geteuid() == 0:
-        assert ports.obstacle(str(port)) is None  # root needs no right
+        assert serial_ports.obstacle(str(port)) is None  # root needs no right
     else:
-        assert "no right to read and write" in (ports.obstacle(str(port)) or "")
+        assert "no right to read and write" in (serial_ports.obstacle(str(port)) or "")
 
 
 def test_a_port_that_a_daemon_has_locked_names_its_process(pty, tmp_path, monkeypatch):
     monkeypatch.setenv("RUNTIME_DIRECTORY", str(tmp_path))
     with DaemonLock(device_lock_path(tmp_path, pty)):
-        told = ports.obstacle(pty)
+        told = serial_ports.obstacle(pty)
     assert told == f"{pty} is in use by a daemon (process {os.getpid()})"
-    assert ports.obstacle(pty) is None
+    assert serial_ports.obstacle(pty) is None
 
 
 def test_looking_at_a_lock_neither_takes_nor_makes_it(tmp_path):
     lock = tmp_path / "a.lock"
-    assert ports.holder_of(lock) is None
+    assert serial_ports.holder_of(lock) is None
     assert not lock.exists()
     with DaemonLock(lock):
-        assert ports.holder_of(lock) == str(os.getpid())
+        assert serial_ports.holder_of(lock) == str(os.getpid())
     with DaemonLock(lock):
         pass
 
 
 def test_a_url_is_left_to_its_driver():
-    assert ports.obstacle("socket://127.0.0.1:9") is None
+    assert serial_ports.obstacle("socket://127.0.0.1:9") is None
 
 
 # -- the machine -----------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from thermoctl.services.places import runtime_dir
 SERVICE_RUN: Final = Path("/run/thermoctl")
 
 
-def serial_ports() -> list[str]:
+def present() -> list[str]:
     """Return the serial ports, each with what is plugged in if that is known."""
     return [
         f"{port.device} ({port.description})" if port.vid is not None else port.device
