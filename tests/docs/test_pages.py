@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
 import shlex
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,7 +28,9 @@ SOURCES = sorted([*(TOP / "thermoctl").rglob("*.py"), *(TOP / "drivers").rglob("
 
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
-FENCE = re.compile(r"^(?P<tail>```+)(?P<kind>[\w{}-]*)\n(?P<body>.*?)^(?P=tail)", re.DOTALL | re.M)
+FENCE = re.compile(
+    r"^(?P<tail> *```+)(?P<kind>[\w{}-]*)\n(?P<body>.*?)^(?P=tail)", re.DOTALL | re.M
+)
 SCRIPT = re.compile(r"<!-- run -->\n+```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 FILE = re.compile(r"`([\w.-]+(?:/[\w.-]+)+/?)`")
 MENTION = re.compile(r"\bdocs/[\w/-]+\.md\b")
@@ -48,12 +54,24 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", each.lower()).strip().replace(" ", "-") for each in headings}
 
 
-def commands(page: Path) -> Iterator[list[str]]:
-    """Yield the words of every ``thermoctl`` call in the shell blocks of `page`."""
+def shell_lines(page: Path) -> Iterator[str]:
+    """Yield the lines of the shell blocks of `page`, continued ones joined."""
     for block in FENCE.finditer(text_of(page)):
         if block["kind"] in ("sh", "bash", "console"):
             for line in block["body"].replace("\\\n", " ").splitlines():
-                yield from calls(line.removeprefix("$ "))
+                yield line.strip().removeprefix("$ ")
+
+
+def commands(page: Path) -> Iterator[list[str]]:
+    """Yield the words of every ``thermoctl`` call in the shell blocks of `page`."""
+    for line in shell_lines(page):
+        yield from calls(line)
+
+
+def bench_tests() -> list[list[str]]:
+    """Return every bench test on a page that ends by itself and needs no terminal."""
+    found = {tuple(words): words for page in PAGES for words in commands(page)}
+    return [words for words in found.values() if {"--sim", "--duration"} <= set(words)]
 
 
 def calls(line: str) -> Iterator[list[str]]:
@@ -130,10 +148,51 @@ def test_commands_on_a_page_have_the_options_they_are_given(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=named)
 def test_examples_marked_to_run_do_run(page, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+    run_examples(SCRIPT.findall(text_of(page)), tmp_path, monkeypatch)
+
+
+def test_every_example_of_the_front_page_runs(tmp_path, monkeypatch):
+    blocks = FENCE.finditer(text_of(TOP / "README.md"))
+    examples = [block["body"] for block in blocks if block["kind"] == "python"]
+    assert examples
+    run_examples(examples, tmp_path, monkeypatch)
+
+
+@pytest.mark.e2e
+@pytest.mark.parametrize("words", bench_tests(), ids=" ".join)
+def test_a_bench_test_on_a_page_runs_to_its_end(words, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "thermoctl", *words],
+        cwd=tmp_path,
+        env=os.environ | {"XDG_STATE_HOME": str(tmp_path)},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=120.0,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "summary" in json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_scripts_that_a_page_calls_are_there(page):
+    called = [
+        word
+        for line in shell_lines(page)
+        for word in line.partition("#")[0].split()
+        if line.startswith(("./dev", "python")) and word.endswith((".py", "dev"))
+    ]
+    assert [word for word in called if not (TOP / word).is_file()] == []
+
+
+def run_examples(examples: list[str], directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run `examples`, one after the other, where the profiles lie as they do in the source tree."""
+    (directory / "config").symlink_to(TOP / "config")
+    monkeypatch.chdir(directory)
     shared: dict[str, object] = {"__name__": "example"}
-    for example in SCRIPT.findall(text_of(page)):
-        exec(compile(example, named(page), "exec"), shared)
+    for example in examples:
+        exec(compile(example, "example", "exec"), shared)
 
 
 def test_a_misspelt_option_would_be_noticed():
