@@ -1,4 +1,4 @@
-"""A board that reads what it is told and writes nowhere: for a dry run of a configuration."""
+"""A board that reads what it is told and writes nowhere: a dry run."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class NullSettings(BaseModel):
 
 
 class NullBoard:
-    """Dry run: one input that stands still, or follows `inject`; an output that goes nowhere.
+    """Dry run: one input that stands still or is injected, an output to nowhere.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class NullBoard:
         return Identity(kind="null", name="dry run", version="1")
 
     def read(self, deadline_s: float) -> Mapping[str, RawSample]:
-        """Return the constant, or what was injected; raise `LinkError` when it is not open."""
+        """Return the constant, or what was injected; `LinkError` when not open."""
         del deadline_s
         self._check_open()
         self._counters["reads"] += 1

@@ -1,4 +1,4 @@
-"""A board that is wired to a simulated tank: for trying things out, for tests and for teaching.
+"""A board wired to a simulated tank, for trials, tests and teaching.
 
 The tank's time is the clock's: every `read` and `write` first lets the tank catch up. On a
 simulated clock an hour takes a fraction of a second; on a real one the tank lives in real time.
@@ -31,7 +31,7 @@ MAINS_PERIODS_A_BURST = 2
 
 
 class SimulatedSettings(BaseModel):
-    """Table ``[boards.NAME]`` with ``kind = "simulated"``: the tank and the board's converters."""
+    """Table ``[boards.NAME]`` of ``kind = "simulated"``: tank and converters."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -188,7 +188,7 @@ class SimulatedBoard:
         return {OUTPUT: self._drive}
 
     def health(self) -> Health:
-        """Return counters; ``degraded`` while the sensor is missing, ``down`` when closed."""
+        """Return counters; ``degraded`` without a sensor, ``down`` when closed."""
         if not self._is_open:
             return Health("down", dict(self._counters), self._last_good_s, "board is not open")
         status, error = ("degraded", "no sample from the sensor") if self._missing else ("ok", None)
@@ -219,7 +219,7 @@ class SimulatedBoard:
         }
 
     def disturb(self, name: str, amount: float | None = None) -> str:
-        """Start the disturbance `name`, one of `thermoctl.plant.disturbances.DISTURBANCES`.
+        """Start the disturbance `name`, one of `DISTURBANCES` of the plant.
 
         Raises
         ------

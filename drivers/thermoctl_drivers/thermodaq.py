@@ -1,4 +1,4 @@
-"""The thermodaq board (ATmega328P, LM335 in, triac or solid-state relay out) as a `Board`.
+"""The thermodaq board, LM335 in and heater out, as a `Board`.
 
 One input, ``temperature``: the sum of a burst of conversions over whole mains periods. One output,
 ``heater``: a power fraction, which expires on the board itself. The protocol is in
@@ -77,7 +77,7 @@ class ThermoDaqSettings(BaseModel):
 
 
 class ThermoDaq:
-    """thermodaq: LM335 in, heater out, with a dead-man; an Arduino Uno on a serial port.
+    """thermodaq: LM335 in, heater out, dead-man; an Arduino Uno on a serial port.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ class ThermoDaq:
             return identity
 
     def read(self, deadline_s: float) -> Mapping[str, RawSample]:
-        """Return the last burst of the converter; empty while the first one is not complete.
+        """Return the last burst of the converter; empty before the first one.
 
         A board that has started anew is initialised again, with power 0.
 

@@ -1,4 +1,4 @@
-"""The thermodaq board without its chip: the firmware's behaviour, written a second time in Python.
+"""The thermodaq board without its chip: its behaviour in Python.
 
 It answers byte for byte as the firmware does (the same tests run against both), so that the board
 can be simulated where no AVR compiler or chip simulator is installed. There is no zero-cross input:
@@ -76,7 +76,7 @@ class Output:
         self._sum = 0
 
     def command(self, power: int, valid_ms: int, now_us: int) -> int:
-        """Take `power`, limited to the cap, for at most `valid_ms`; return what was taken."""
+        """Take `power`, capped, for at most `valid_ms`; return what was taken."""
         power = min(power, self._chosen.power_max)
         if self._chosen.phase_angle and power < _PHASE_LEAST:
             power = 0
@@ -102,7 +102,7 @@ class Output:
 
 
 class Converter:
-    """The analog input: bursts over whole mains periods, 10 bits, noise and pickup on it."""
+    """The analog input: bursts over whole mains periods, 10 bits, noise, pickup."""
 
     def __init__(self, seed: int) -> None:
         self.millivolts = 0.0
@@ -193,7 +193,7 @@ class BoardModel:
         pickup_mv: float = 0.0,
         mains_hz: float = 50.0,
     ) -> None:
-        """Put `millivolts` on the analog input, with normal noise and a sine of the mains."""
+        """Put `millivolts` on the analog input, with noise and a sine of the mains."""
         each = self._converter
         each.millivolts, each.noise_mv = millivolts, noise_mv
         each.pickup_mv, each.mains_hz = pickup_mv, mains_hz

@@ -1,4 +1,4 @@
-"""The board's firmware on a simulated ATmega328P, through libsimavr and a small C harness.
+"""The board's firmware on a simulated ATmega328P, through libsimavr.
 
 Both are built by ``make all sim`` in drivers/firmware/thermodaq and are no part of the wheel; where
 they cannot be built, `thermoctl_drivers.thermodaq_board` does the same without them.
@@ -30,7 +30,7 @@ _RECEIVE_SIZE = 4096
 
 @cache
 def missing() -> str | None:
-    """Return what this machine lacks to simulate the chip, None when everything is there."""
+    """Return what this machine lacks to simulate the chip, None for nothing."""
     if not (FIRMWARE / "Makefile").is_file():
         return f"expected the firmware's sources in {FIRMWARE}, they are not installed"
     if shutil.which("make") is None:
@@ -46,7 +46,7 @@ def missing() -> str | None:
 
 @cache
 def build() -> Path:
-    """Build firmware and harness where they are out of date; return the build directory.
+    """Build firmware and harness where out of date; return the directory.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def _library() -> ctypes.CDLL:
 
 
 class Chip:
-    """An ATmega328P with our firmware, moved on by `advance` alone; equal calls, equal results.
+    """An ATmega328P with our firmware; only `advance` moves it on.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class Chip:
         pickup_mv: float = 0.0,
         mains_hz: float = 50.0,
     ) -> None:
-        """Put `millivolts` on the analog input, with normal noise and a sine of the mains."""
+        """Put `millivolts` on the analog input, with noise and a sine of the mains."""
         self._calls.thermodaq_sim_analog(self._board, millivolts, noise_mv, pickup_mv, mains_hz)
 
     def crossings(self, mains_hz: float) -> None:

@@ -1,4 +1,4 @@
-"""One request, one reply, one deadline: how the host talks to the thermodaq board."""
+"""One request, one reply, one deadline: how host and board talk."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Exchange:
     def ask(
         self, letter: str, *arguments: int, deadline_s: float, wait_s: float, attempts: int
     ) -> Answer:
-        """Return the answer to ``letter arguments``; send anew what stays without a valid one.
+        """Return the answer to ``letter arguments``; ask anew until one is valid.
 
         Parameters
         ----------

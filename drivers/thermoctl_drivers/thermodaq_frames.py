@@ -1,4 +1,4 @@
-"""The line protocol of the thermodaq board: bytes to values and back, without a port or a clock.
+"""The line protocol of the thermodaq board: bytes to values and back.
 
 A request is ``>SS C arguments*CCCC`` and a line feed, a reply ``<SS C fields*CCCC`` and a line
 feed: a sequence number of two hex digits, one letter, decimal fields, and a CRC-16 (polynomial

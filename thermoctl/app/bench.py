@@ -140,7 +140,7 @@ def _recorded(settings: Settings, path: Path) -> Iterator[Callable[[Cycle], None
 
 
 def history_path(state: Path | None) -> Path | None:
-    """Return where a bench test is recorded; None, with a word on stderr, where it cannot be."""
+    """Return where a bench test is recorded, or None where it cannot be."""
     try:
         return make_private(state or state_dir()) / HISTORY
     except Exception as error:  # noqa: BLE001 - a bench test without its record is still one

@@ -79,7 +79,7 @@ def cli(
     state: Path | None,
     as_json: bool,
 ) -> None:
-    """Hold a temperature; identify the plant online, with error bars; fail with the heater off."""
+    """Hold a temperature; identify the plant online, with error bars."""
     if ctx.invoked_subcommand is not None:
         if sim:
             raise click.UsageError("--sim stands alone, without a command")

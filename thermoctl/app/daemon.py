@@ -137,7 +137,7 @@ class Daemon:
     # -- running ---------------------------------------------------------------------------------
 
     def run(self) -> bool:
-        """Run until a signal ends it; return whether power 0 was confirmed by every board."""
+        """Run until a signal ends it; return whether every board confirmed 0."""
         for number in SIGNALS:
             signal.signal(number, self._note_signal)
         with contextlib.ExitStack() as stack:

@@ -55,7 +55,7 @@ def _innovation(estimate: Estimate) -> float:
 
 
 class Summary:
-    """Figures of one loop's run, gathered as it goes; memory does not grow with the run.
+    """Figures of one loop's run, gathered in bounded memory.
 
     Judged on the true temperature where a simulation knows it. Settled is the first moment from
     which the temperature stays within 0.1 K of the set point for a minute; deviations count from

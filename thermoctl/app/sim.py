@@ -1,4 +1,4 @@
-"""The bench test: a configuration's loops on simulated tanks instead of its boards."""
+"""The bench test: loops on simulated tanks instead of their boards."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def profile(name: str) -> Path:
 
 
 def simulate(settings: Settings, duration_s: float, seed: int | None = None) -> Iterator[Cycle]:
-    """Yield the cycles of `duration_s` seconds of simulated time, as fast as they are computed.
+    """Yield the cycles of `duration_s` simulated seconds at full speed.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""``thermoctl simulate thermodaq``: the board behind a pseudo terminal, wired to a simulated tank.
+"""``thermoctl simulate thermodaq``: board and tank behind a pseudo terminal.
 
 The firmware runs on a simulated chip where compiler and simulator are installed, else the board is
 played by `thermoctl_drivers.thermodaq_board`; the caller is told which. A daemon, or anybody's own
@@ -102,7 +102,7 @@ def board_for(
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """What the wires between tank and board add: noise rms and mains pickup amplitude, in mV."""
+    """What the wires add: noise rms and mains pickup amplitude, in mV."""
 
     noise_mv: float = 5.0
     pickup_mv: float = 20.0
@@ -110,7 +110,7 @@ class Wiring:
 
 
 class WiredBoard:
-    """A simulated board whose input is a tank's sensor and whose output is its heater.
+    """A simulated board between a tank's sensor and its heater.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def wired(
     seed: int = 1,
     wiring: Wiring | None = None,
 ) -> WiredBoard:
-    """Return `board` wired to a new tank; the rig of O21 when no `parameters` are given."""
+    """Return `board` wired to a new tank, that of O21 without `parameters`."""
     tank = Tank(parameters or TankParameters(), np.random.default_rng(seed), Linear())
     return WiredBoard(board, tank, wiring)
 
@@ -209,7 +209,7 @@ def terminal(link: Path) -> Iterator[int]:
 def serve(
     device: WiredBoard, descriptor: int, stop: Callable[[], bool], duration_s: float = math.inf
 ) -> None:
-    """Let `device` live in real time and pass bytes on, until `stop` or for `duration_s`.
+    """Let `device` live in real time and pass bytes on, until `stop`.
 
     A machine that is too slow loses simulated time rather than answering late for ever.
     """
@@ -241,7 +241,7 @@ def simulate_thermodaq(
     duration_s: float = math.inf,
     report: Report = lambda text: None,
 ) -> None:
-    """Run a simulated thermodaq board and tank behind a pseudo terminal, in real time.
+    """Run a simulated thermodaq board and tank behind a pseudo terminal.
 
     Parameters
     ----------

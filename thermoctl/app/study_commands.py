@@ -1,4 +1,4 @@
-"""Commands that study a run instead of steering one: ``replay`` and ``reproduce experiment``."""
+"""Commands that study a run: ``replay`` and ``reproduce experiment``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Self-tuning minimum variance: the power that puts the predicted temperature on its reference.
+"""Self-tuning minimum variance: predicted temperature onto reference.
 
 Implements section 5 of ``docs/theory.md``.
 """
@@ -23,7 +23,7 @@ HOLDING_SD_MAX = 0.05
 
 @dataclass(frozen=True, slots=True)
 class SelfTuningMinimumVariance:
-    r"""The certainty-equivalent minimum variance law of O21 (23), for a delay of one sample.
+    r"""The certainty-equivalent minimum variance law of O21 (23), delay one.
 
     .. math::
 
@@ -81,7 +81,7 @@ class SelfTuningMinimumVariance:
         """Return None: all that is remembered are the estimate and the applied inputs."""
 
     def decide(self, belief: None, situation: Situation) -> tuple[None, float]:
-        """Return the power for the next interval, unbounded; NaN when something is not known."""
+        """Return the next interval's power, unbounded; NaN when not known."""
         y, r = situation.temperature_c, situation.setpoint_c
         if not (math.isfinite(y) and math.isfinite(r)):
             return None, math.nan
@@ -162,7 +162,7 @@ class SelfTuningMinimumVariance:
 
     @property
     def ride_s(self) -> float:
-        """How long the model may steer without a sensor: Tc, which is three lags, at most 60 s."""
+        """How long the model may steer without a sensor: Tc, at most 60 s."""
         return min(self.reference_time_s, RIDE_MAX_S)
 
 

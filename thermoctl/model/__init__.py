@@ -1,1 +1,1 @@
-"""What is assumed about the plant, its sensor and its actuator: structure, curves, laws."""
+"""What is assumed of plant, sensor and actuator: structure, curves, laws."""

@@ -17,7 +17,7 @@ TWO_PI = 2.0 * math.pi
 
 
 class ActuatorLaw(Protocol):
-    """How a power stage answers its drive; both directions map [0, 1] to [0, 1] and rise."""
+    """How a power stage answers its drive; both ways rising, [0, 1] to [0, 1]."""
 
     def drive_for(self, power: float) -> float:
         """Return the drive that gives `power`; NaN gives 0."""
@@ -30,7 +30,7 @@ class ActuatorLaw(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Linear:
-    """A stage that takes power itself, such as a solid-state relay behind a linear controller."""
+    """A stage that takes power itself, such as a relay with a linear input."""
 
     def drive_for(self, power: float) -> float:
         """Return the drive that gives `power`."""
@@ -43,7 +43,7 @@ class Linear:
 
 @dataclass(frozen=True, slots=True)
 class SquareLaw:
-    """A stage that sets the voltage of a resistive load: P is proportional to V squared.
+    """A stage that sets the voltage of a resistive load: P goes with V squared.
 
     The drive is the fraction of full voltage, as in the triac module of O21 (0 to 220 V).
     """
@@ -94,7 +94,7 @@ class PhaseAngle:
 
 @dataclass(frozen=True, slots=True)
 class WholeCycleBurst:
-    """A relay that passes `k` of every `cycles` mains cycles: no direct current, no phase cuts.
+    """A relay that passes `k` of every `cycles` mains cycles, each whole.
 
     Parameters
     ----------

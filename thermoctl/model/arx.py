@@ -1,4 +1,4 @@
-"""Structures of a plant that is linear in its parameters: what is regressed on what.
+"""Structures of a plant linear in its parameters: what regresses on what.
 
 Signs and order are those of O21 (1); ``u`` is always the power that was APPLIED. Implements
 section 1 of ``docs/theory.md``.
@@ -141,7 +141,7 @@ class Arx:
 
 @dataclass(frozen=True, slots=True)
 class KnownGain:
-    r"""The first-order structure of O21 (27): the input's effect is known, the pole is learned.
+    r"""The first-order structure of O21 (27): known gain, learned pole.
 
     .. math:: y(t) = a\,y(t-1) + b\,u(t-1) + v(t)
 

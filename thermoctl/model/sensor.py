@@ -37,7 +37,7 @@ class Conversion(Protocol):
 
 
 class ResistanceCurve(Protocol):
-    """What a resistance means; NaN where the curve is not defined, never an exception."""
+    """What a resistance means; NaN off the curve, never an exception."""
 
     def temperature_c(self, ohm: float) -> float:
         """Return the temperature in degC at `ohm`."""
@@ -243,7 +243,7 @@ class Beta:
 
 @dataclass(frozen=True, slots=True)
 class PullUp:
-    """A resistive sensor to ground below a pull-up resistor: open reads high, short reads 0.
+    """A resistive sensor to ground under a pull-up: open is high, short is 0.
 
     Parameters
     ----------
@@ -280,7 +280,7 @@ class PullUp:
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Correction of one chain: the voltage times `gain`, the temperature plus `offset_k`.
+    """Correction of one chain: voltage times `gain`, plus `offset_k`.
 
     Parameters
     ----------
@@ -306,7 +306,7 @@ class Calibration:
 
     @classmethod
     def by_gain(cls, conversion: Conversion, volts: float, reference_c: float) -> Calibration:
-        """Return the gain that makes `volts` read `reference_c`; for sensors with 0 V at 0 K.
+        """Return the gain that makes `volts` read `reference_c`; 0 V at 0 K only.
 
         Raises
         ------

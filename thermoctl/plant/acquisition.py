@@ -1,4 +1,4 @@
-"""The acquisition: noise, mains pickup that aliases, a burst of conversions, a quantiser.
+"""The acquisition: noise, aliased pickup, a burst, a quantiser.
 
 Pickup is a sine whose phase runs on between conversions at a mains frequency that wanders a
 little. Each conversion sees it at its own instant, so one conversion a second folds it to

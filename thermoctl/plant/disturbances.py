@@ -1,4 +1,4 @@
-"""Disturbances by name: what can befall a tank, in which unit, and how much by default."""
+"""Disturbances by name: what can befall a tank, its unit, its default."""
 
 from __future__ import annotations
 

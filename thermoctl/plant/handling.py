@@ -1,4 +1,4 @@
-"""What people do to the water: pour, drain, throw ice. Each takes a state and returns the next."""
+"""What people do to the water: pour, drain, throw ice."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SLUSH = 20.0
 
 
 def pour(heat: Heat, vessel: Vessel, litres: float, temperature_c: float) -> Heat:
-    """Return the state after water came in, evenly over both zones; what overflows is drained.
+    """Return the state after water came in; what overflows is drained.
 
     Raises
     ------

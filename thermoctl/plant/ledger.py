@@ -9,7 +9,7 @@ from thermoctl.plant.thermal import Heat
 
 
 def stored_j(heat: Heat) -> float:
-    """Return the enthalpy of tank and bath; ice has less than water of 0 degC, which has none."""
+    """Return the enthalpy of tank and bath; water of 0 degC has none."""
     ice_j = -FUSION_J_PER_KG * (heat.ice_kg + heat.bath_ice_kg)
     return heat.element_j + heat.water_j + heat.still_j + heat.wall_j + heat.bath_j + ice_j
 

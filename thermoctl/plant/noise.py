@@ -1,4 +1,4 @@
-"""Randomness for the plant: normal numbers drawn in blocks, and values that wander.
+"""Randomness for the plant: normal numbers in blocks, wandering values.
 
 Every source has a generator of its own, spawned from the one that was handed in, so that a
 disturbance at one place does not change the noise at another.
@@ -14,7 +14,7 @@ BLOCK = 512
 
 
 class Normals:
-    """Standard normal numbers one at a time, for a twentieth of the price of single draws."""
+    """Standard normal numbers one at a time, drawn in blocks."""
 
     __slots__ = ("_block", "_rng")
 

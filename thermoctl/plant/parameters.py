@@ -1,4 +1,4 @@
-"""What the tank is made of: frozen, in SI, every number with its source or its reason.
+"""What the tank is made of: frozen, in SI, each number with its source.
 
 The defaults are the reference rig, 8 l of water in an aquarium that stands in ice (O21, section
 "Computer-assisted temperature control"). Where O21 says nothing the value follows from the
@@ -31,7 +31,7 @@ def require(name: str, value: float, low: float, high: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Vessel:
-    """Water, glass and what drains them of heat. The default is a box of 0.25 x 0.20 x 0.16 m.
+    """Water, glass and what drains heat; by default 0.25 x 0.20 x 0.16 m.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ class Bath:
 
     @classmethod
     def holding(cls, ice_kg: float, size: float = 1.0) -> Bath:
-        """Return a bath of `ice_kg` whose container is `size` times the reference in area."""
+        """Return a bath of `ice_kg`; its area is `size` times the reference's."""
         if ice_kg == 0.0:
             return cls(ice_kg=0.0, water_kg=0.0)
         default = cls()

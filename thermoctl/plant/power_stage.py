@@ -20,7 +20,7 @@ STAGES: Mapping[str, ActuatorLaw] = {
 
 
 class PowerStage:
-    """A resistive heater behind `law`; its power goes with the square of the mains voltage.
+    """A resistive heater behind `law`, on a mains voltage that varies.
 
     Parameters
     ----------

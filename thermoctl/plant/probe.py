@@ -1,4 +1,4 @@
-"""The probe: water that arrives late, a sheath that follows, and what can befall the wire."""
+"""The probe: late water, a sheath that follows, a wire that can fail."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class ProbeInTank:
         self._wiring_until_s = self._t_s + duration_s
 
     def volts(self) -> float:
-        """Return the voltage on the wire: infinite when open, 0 when short, NaN when missing.
+        """Return the voltage on the wire: infinite open, 0 short, NaN missing.
 
         A pending spike is used up.
         """

@@ -56,7 +56,7 @@ class Tank:
 
     @property
     def temperature_c(self) -> float:
-        """Mean temperature of the water, weighted by mass: what a perfect sensor would show."""
+        """Mean temperature of the water by mass: what a perfect sensor shows."""
         heat = self._heat
         return (heat.water_j + heat.still_j) / (heat.water_kg * WATER_J_PER_KG_K)
 
@@ -137,7 +137,7 @@ class Tank:
         self._heat = handling.pour(self._heat, self.parameters.vessel, litres, temperature_c)
 
     def drain(self, fraction: float) -> None:
-        """Let `fraction` of the water run out; raises as `thermoctl.plant.handling.drain` does."""
+        """Let `fraction` of the water run out, as `handling.drain` has it."""
         self._heat = handling.drain(self._heat, self.parameters.vessel, fraction)
 
     def throw_ice(self, ice_kg: float) -> None:

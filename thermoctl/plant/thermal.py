@@ -1,4 +1,4 @@
-"""Heat and mass of the tank: one frozen state, its rates of change, one step of time.
+"""Heat and mass of the tank: a frozen state, its rates, one step.
 
 The state holds enthalpies (0 for liquid water at 0 degC) and masses, not temperatures. Its rates
 are sums of flows, each of which leaves one entry and enters another, so that any Runge-Kutta step
@@ -25,7 +25,7 @@ LONGEST_STEP_S = 0.5
 
 
 class Heat(NamedTuple):
-    """The state: enthalpies in J, masses in kg, and what has crossed the boundary so far."""
+    """The state: enthalpies in J, masses in kg, and what crossed the boundary."""
 
     element_j: float
     water_j: float
@@ -58,7 +58,7 @@ class Temperatures(NamedTuple):
 
 
 class Conductances(NamedTuple):
-    """Coefficients of the rates for one situation: stirred or not, with or without draught."""
+    """Coefficients of the rates in one situation: stirring, draught."""
 
     element_j_per_k: float
     wall_j_per_k: float
@@ -80,19 +80,19 @@ class Conductances(NamedTuple):
 
 
 def saturation_pa(temperature_c: float) -> float:
-    """Return the saturation vapour pressure over water (Magnus; Alduchov and Eskridge, 1996)."""
+    """Return the vapour pressure over water (Alduchov and Eskridge, 1996)."""
     return 610.94 * math.exp(17.625 * temperature_c / (temperature_c + 243.04))
 
 
 def vaporisation_j_per_kg(temperature_c: float) -> float:
-    """Return the latent heat of evaporation; a straight line within 0.3 % from 0 to 100 degC."""
+    """Return the latent heat of evaporation, within 0.3 % from 0 to 100 degC."""
     return 2.501e6 - 2.361e3 * temperature_c
 
 
 def conductances(
     parameters: TankParameters, *, stirred: bool = True, draught: float = 1.0
 ) -> Conductances:
-    """Return the coefficients; `draught` multiplies what the air carries off the surface."""
+    """Return the coefficients; `draught` multiplies what the air carries off."""
     vessel, element, room = parameters.vessel, parameters.element, parameters.room
     area = vessel.glass_area_m2
     film = vessel.inner_w_per_m2_k if stirred else vessel.still_inner_w_per_m2_k
@@ -157,7 +157,7 @@ def temperatures(k: Conductances, heat: Heat) -> Temperatures:
 
 
 def evaporation_kg_per_s(k: Conductances, water_c: float, water_kg: float) -> float:
-    """Return the vapour that leaves the surface; negative where the air condenses on it."""
+    """Return the vapour that leaves the surface; negative: it condenses."""
     wet = (water_kg / k.nominal_kg - DRY_PART) / DRY_PART
     if wet <= 0.0:
         return 0.0
@@ -169,7 +169,7 @@ def evaporation_kg_per_s(k: Conductances, water_c: float, water_kg: float) -> fl
 
 
 class Outside(NamedTuple):
-    """Flows beyond the glass: W out of the wall, into the bath, to the room; kg/s of melting."""
+    """Flows beyond the glass: W to wall, bath and room; kg/s of melting."""
 
     wall_w: float
     bath_w: float

@@ -29,7 +29,7 @@ VARIED: Mapping[str, tuple[str, ...]] = {
 
 
 def specimen(parameters: TankParameters, rng: Generator, spread: float = 0.1) -> TankParameters:
-    """Return `parameters` with every entry of `VARIED` multiplied by a log-normal factor.
+    """Return `parameters`, each of `VARIED` times a log-normal factor.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Consumers of finished cycles: history, state on disk, journal. They never steer."""
+"""Consumers of finished cycles: history, state, journal. They never steer."""

@@ -82,5 +82,5 @@ REASONS: Final = frozenset({"limit.high", "limit.low", "limit.rate", "sensor.goo
 
 
 def level_of(name: str) -> str:
-    """Return the level of the event `name`; one that a plug-in brought along is a warning."""
+    """Return the level of the event `name`; an unknown one is a warning."""
     return EVENTS.get(name, "warning")

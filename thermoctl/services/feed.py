@@ -1,4 +1,4 @@
-"""A bounded feed from the loop to a thread that does I/O: drops the oldest and counts drops."""
+"""A bounded feed from the loop to a thread; drops the oldest, counted."""
 
 from __future__ import annotations
 

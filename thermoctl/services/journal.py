@@ -72,7 +72,7 @@ class Journal:
         self._put(level_of(event.name), event.name, loop, {**event.fields, "t_s": event.t_s})
 
     def processor(self, logger: Any, method: str, event_dict: MutableMapping[str, Any]) -> NoReturn:
-        """End structlog's chain: ``get_logger().warning("name", key=value)`` comes here too."""
+        """End structlog's chain: what any logger of the process says comes here."""
         fields = dict(event_dict)
         name, loop = str(fields.pop("event", "")), fields.pop("loop", None)
         self._put(method if method in PRIORITIES else "info", name, loop, fields)
@@ -103,7 +103,7 @@ class Journal:
             self._failed += not self._write(record)
 
     def close(self, timeout_s: float = 1.0) -> bool:
-        """Write what waits and return whether it went in time; a blocked sink is left behind."""
+        """Write what waits; return whether it went in time."""
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join(timeout_s)

@@ -1,4 +1,4 @@
-"""Keep the latches on disk as the regulator has them, and notice an acknowledgement made there.
+"""Keep the latches on disk as the regulator has them; notice deletions.
 
 The loop says what is latched and goes on; a thread does the I/O. The file follows the regulator,
 never the other way round: one that was deleted is written again at once and the deletion is handed
@@ -85,7 +85,7 @@ class LatchKeeper:
         self._told.put((loop, None))
 
     def close(self, timeout_s: float = 1.0) -> bool:
-        """Write what is wanted a last time; return whether the disk agrees with the regulator."""
+        """Write what is wanted a last time; return whether the disk agrees."""
         self._told.put(None)
         if self._thread.is_alive():
             self._thread.join(timeout_s)

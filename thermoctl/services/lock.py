@@ -1,4 +1,4 @@
-"""One daemon per state folder and per device: the second is refused and told who holds it."""
+"""One daemon per state folder and device; a second hears who holds it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LONGEST: Final = 64
 
 
 def device_lock_path(directory: Path, device: str) -> Path:
-    """Return the lock file of `device` in `directory`; every name of one device gives the same."""
+    """Return the lock file of `device`, the same for all of its names."""
     return directory / f"device-{quote(os.path.realpath(device), safe='')}.lock"
 
 

@@ -1,4 +1,4 @@
-"""Talk to the service manager: sd_notify(3) in a few lines, never raising and never blocking."""
+"""Talk to the service manager: sd_notify(3), never raising or blocking."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 
 class Notifier:
-    """Sends state to the socket named by ``$NOTIFY_SOCKET``; without one, every call does nothing.
+    """Sends state to ``$NOTIFY_SOCKET``; without one, does nothing.
 
     Every method returns whether the message left. A service manager that is gone or does not
     read must not cost the loop a cycle, so nobody needs to look at it.
@@ -62,7 +62,7 @@ class Notifier:
 def watchdog_interval_s(
     environ: Mapping[str, str] = os.environ, pid: int | None = None
 ) -> float | None:
-    """Return within how many seconds the service manager wants a sign of life, or None.
+    """Return in how many s the service manager wants a sign of life, or None.
 
     ``$WATCHDOG_PID`` may name another process than `pid` (default: this one); then the time-out
     in ``$WATCHDOG_USEC`` is not ours.

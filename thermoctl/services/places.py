@@ -1,4 +1,4 @@
-"""Where state and sockets live: the service manager's folders, the user's, or a private one."""
+"""Where state and sockets live: the service's, the user's, or private."""
 
 from __future__ import annotations
 

@@ -11,13 +11,13 @@ import numpy as np
 
 
 def plain_text(value: Any) -> str:
-    """Return `value` as one printable line; control characters and lone surrogates are escaped."""
+    """Return `value` as one printable line, whatever had to be escaped."""
     text = str(value)
     return text if text.isprintable() else repr(text)[1:-1]
 
 
 def as_json(fields: Mapping[str, Any]) -> str:
-    """Return `fields` as one line of JSON; what is no finite number becomes null or its text."""
+    """Return `fields` as one line of JSON; no finite number: null or text."""
     return json.dumps(_tame(fields))
 
 

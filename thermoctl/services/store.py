@@ -163,7 +163,7 @@ class Latch:
 
 
 class LatchStore:
-    """The latches of all loops, in a folder that survives and, where given, a spare one.
+    """The latches of all loops, in a folder that survives, and a spare one.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ class LatchStore:
         raise errors[0]
 
     def load(self, loop: str) -> Latch | None:
-        """Return the latch of `loop`, if any; one that cannot be read is one all the same."""
+        """Return the latch of `loop`, if any; an unreadable one counts."""
         for store in self._stores:
             stored = store.read(_latch(loop))
             if stored.document is not None or stored.warning is not None:

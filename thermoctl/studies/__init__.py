@@ -1,1 +1,1 @@
-"""Offline work without a clock: replay of records and reproduction of experiments."""
+"""Offline work without a clock: replays, and experiments reproduced."""

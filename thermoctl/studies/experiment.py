@@ -1,4 +1,4 @@
-"""Measures of a control run: how it warmed up and how well it held (docs/experiment.md).
+"""Measures of a control run: how it warmed up and how well it held.
 
 The true temperature is judged where it is known, not what the sensor says of it.
 """
@@ -73,7 +73,7 @@ class Run:
 
 
 def run_from_cycles(cycles: Iterable[Cycle]) -> Run:
-    """Return the run the `cycles` of one loop make; raise `RunError` on fewer than two."""
+    """Return the run of one loop's `cycles`; `RunError` on fewer than two."""
     rows = [
         (
             cycle.step.t_s,
@@ -135,7 +135,7 @@ class Measures:
 
 
 def regulation_window(run: Run) -> slice | None:
-    """Return the cycles in which the set point is held; None when it was never reached."""
+    """Return the cycles at the set point; None when it was never reached."""
     arrival = _arrival(run)
     if arrival is None:
         return None
@@ -177,7 +177,7 @@ def measure(run: Run) -> Measures:
 
 
 def limit_cycle(t_s: Array, temperature: Array) -> tuple[float, float] | None:
-    """Return peak-to-peak and period of a regular oscillation, or None if there is none.
+    """Return peak-to-peak and period of a regular oscillation, or None.
 
     A cycle runs from one upward crossing of the mean to the next; a crossing counts only after the
     temperature has been half a standard deviation below, so that noise about the mean does not. It

@@ -1,4 +1,4 @@
-"""How every figure looks: one style, the same hues as the live view, SVG and PNG from one drawing.
+"""How every figure looks: one style, one set of hues, SVG and PNG.
 
 matplotlib is an extra (``thermoctl[plot]``) and is loaded only when something is drawn; no window
 is opened and no global state of matplotlib is changed.
@@ -152,7 +152,7 @@ def label(axes: Any, y: float, text: str, hue: str) -> None:
 
 
 def spread_out(places: Sequence[float], gap: float) -> list[float]:
-    """Return `places` moved apart, in their order, so that neighbours are `gap` or more apart."""
+    """Return `places` moved apart by `gap` or more, in their order."""
     order = np.argsort(places, kind="stable")
     apart = np.array(places, dtype=np.float64)[order]
     for index in range(1, len(apart)):
@@ -197,7 +197,7 @@ def envelope(x: Array, y: Array, limit: int = POINTS_PER_PANEL) -> tuple[Array, 
 
 
 def time_unit(duration_s: float) -> tuple[float, str]:
-    """Return seconds in the unit a time axis of `duration_s` is best read in, and its name."""
+    """Return the unit for a time axis of `duration_s` and its name."""
     for unit_s, name in ((1.0, "s"), (60.0, "min"), (3600.0, "h")):
         if duration_s <= 150.0 * unit_s:
             return unit_s, name

@@ -27,7 +27,7 @@ EXAMPLES = "ckf, nkf, nkf:R1=1e-6, rls, rls:0.98, vff, vff:10"
 
 @dataclass(frozen=True, slots=True)
 class LawSpec:
-    """An estimator by name with its constants, before the noise of the record is known."""
+    """An estimator by name with its constants, the noise not yet known."""
 
     text: str
     name: str
@@ -85,7 +85,7 @@ _KINDS: Mapping[str, _Kind] = {
 
 
 def parse_order(text: str) -> Arx:
-    """Return the structure `text` names, as in ``2,2,1``: past outputs, inputs, delay in samples.
+    """Return the structure `text` names: ``n,m,delay`` as in ``2,2,1``.
 
     Raises
     ------

@@ -38,7 +38,7 @@ def replay_json(result: Replay) -> dict[str, Any]:
 def experiment_json(
     measures: Measures, conditions: Mapping[str, Any], figures: Sequence[Path]
 ) -> dict[str, Any]:
-    """Return the measures of an experiment, under which conditions, and where its figures are."""
+    """Return an experiment's measures, conditions and figures."""
     return {
         "measures": _fields(measures),
         "conditions": dict(conditions),

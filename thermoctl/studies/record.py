@@ -1,4 +1,4 @@
-"""Recorded runs: what a CSV or history file holds, and what had to be left out of it.
+"""Recorded runs: what a file holds, and what had to be left out.
 
 A file is read row by row into growing arrays of floats, never as a whole. Rows that are not sound
 are counted, not guessed; a hole in time starts a new stretch, so that no regressor reaches across.
@@ -36,7 +36,7 @@ class RecordError(ThermoctlError, ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """Names of the three columns a replay needs; None: take the obvious one and say so."""
+    """Names of the three columns a replay needs; None: the obvious one."""
 
     output: str | None = None
     input: str | None = None
@@ -78,7 +78,7 @@ class Record:
 
     @property
     def stretch_start(self) -> npt.NDArray[np.intp]:
-        """For every sample, the index at which its stretch without a gap began, shape (T,)."""
+        """For every sample, where its stretch without a gap began, shape (T,)."""
         index = np.arange(len(self.t_s))
         fresh = np.concatenate(([True], np.diff(self.t_s) > GAP * self.period_s))
         return np.maximum.accumulate(np.where(fresh, index, 0))
@@ -161,7 +161,7 @@ def _timing_notes(t_s: Array, timed: bool) -> list[str]:
 def choose_columns(
     source: str, header: Sequence[str], wanted: Columns
 ) -> tuple[Columns, list[str]]:
-    """Return which columns of `header` are read, and notes about those nobody asked for.
+    """Return the columns of `header` to read, with notes on unasked ones.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Replay of a record through estimators: how well would each have foreseen it? (docs/replay.md)
+"""Replay of a record: how well would each estimator have foreseen it.
 
 The record is centred and scaled, the noise is estimated from a first pass, and each law then
 predicts every output one step ahead before it sees it. All figures are given in the units of the

@@ -1,4 +1,4 @@
-"""Figure of a replay: the record, each parameter by every law, each law's innovations."""
+"""Figure of a replay: record, parameters by law, innovations."""
 
 from __future__ import annotations
 

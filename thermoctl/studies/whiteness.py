@@ -1,4 +1,4 @@
-"""Are innovations white? Ljung and Box's test, with its chi-square tail (docs/replay.md).
+"""Whether innovations are white: Ljung and Box's test (docs/replay.md).
 
 An innovation is what a model could not foresee. If it can be foreseen from earlier innovations, the
 model lacks something: an order, a delay, an input, or it tracks too slowly.

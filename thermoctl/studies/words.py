@@ -1,4 +1,4 @@
-"""Numbers as a reader wants them: as many digits as they deserve, a true minus, no NaN."""
+"""Numbers as a reader wants them: digits deserved, true minus, no NaN."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def number(value: float, sd: float) -> str:
 
 
 def probability(p: float) -> str:
-    """Return a probability as a reader wants it: two digits, nothing below a thousandth."""
+    """Return a probability in two digits, nothing below a thousandth."""
     if math.isnan(p):
         return "–"
     return "< 0.001" if p < 0.001 else f"{p:.2g}" if p < 0.1 else f"{p:.2f}"

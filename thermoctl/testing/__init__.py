@@ -1,4 +1,4 @@
-"""What a test of a driver, a loop or a whole daemon needs: time, boards and lines under control.
+"""What a test needs: time, boards and lines under control.
 
 `ManualClock` moves when it is told to. `ScriptedBoard` is a board that follows a script.
 `Transcript` is a line that expects certain bytes and answers with others; `LockStepLink` joins a

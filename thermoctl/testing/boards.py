@@ -14,7 +14,7 @@ from thermoctl.testing.clock import ManualClock
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """One call of `ScriptedBoard.write`: when it came, what it asked, and for how long."""
+    """One call of `ScriptedBoard.write`: when, what, and for how long."""
 
     t_s: float
     outputs: Mapping[str, float]

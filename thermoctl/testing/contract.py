@@ -64,7 +64,7 @@ class Rig:
 
 
 class DriverContract:
-    """What every driver keeps; subclass it as ``class TestMine(DriverContract)``, define `rig`."""
+    """What every driver keeps; subclass it in a test and define `rig`."""
 
     def rig(self) -> Rig:
         """Return a new board with its clock, and its line where it has one."""

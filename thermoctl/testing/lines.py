@@ -1,4 +1,4 @@
-"""Lines under control: written down beforehand, in lock step with a simulation, or broken."""
+"""Lines under control: scripted, in lock step, or broken."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Transcript:
         return len(data)
 
     def read(self, size: int = 1) -> bytes:
-        """Return up to `size` bytes; the clock moves as far as a real read would have waited."""
+        """Return up to `size` bytes; the clock moves as long as a read waits."""
         self._check()
         if self.timeout is None:
             raise AssertionError("expected a time-out, a read without one may block for ever")
@@ -181,7 +181,7 @@ class LockStepLink:
 
 
 class FaultyLink:
-    """Any line, broken on demand: set `fault` to one of `FAULTS`, and to ``healthy`` again.
+    """Any line, broken on demand: set `fault` to one of `FAULTS`.
 
     ``silent`` swallows what is written; ``garbage`` answers noise; ``half`` lets the first half of
     an answer through; ``endless`` streams without a line feed; ``echo`` returns what was written;

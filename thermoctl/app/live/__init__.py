@@ -1,4 +1,4 @@
-"""The live view of a loop in a terminal: what is shown, how it is drawn, which keys it takes."""
+"""The live view of a loop in a terminal: contents, drawing, keys."""
 
 from thermoctl.app.live.desk import Desk
 from thermoctl.app.live.keys import Action, Keys

@@ -87,7 +87,7 @@ def _worst(alarms: tuple[Alarm, ...], *, latched: bool) -> Alarm | None:
 
 
 def why(view: View) -> str:
-    """Return why the heater is off, and what is waited for; empty when it need not be said."""
+    """Return why the heater is off and what is awaited; empty if obvious."""
     step = view.step
     if step is None or step.state not in (State.LATCHED, State.SAFE):
         return ""

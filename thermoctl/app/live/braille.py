@@ -23,7 +23,7 @@ def blank(rows: int, columns: int) -> Dots:
 
 
 def heights(values: Array, low: float, high: float, dots: int) -> Array:
-    """Return where `values` lie on a scale: 0 at `low`, ``dots - 1`` at `high`; NaN stays NaN."""
+    """Return where `values` lie on the scale from `low` to `high`, in dots."""
     return np.rint((values - low) * ((dots - 1) / (high - low)))
 
 
@@ -43,7 +43,7 @@ def envelope(low: Array, high: Array, dots: int) -> Dots:
 
 
 def joined(low: Array, high: Array) -> tuple[Array, Array]:
-    """Return the envelope stretched to touch its left neighbour, so that a steep line is one.
+    """Return the envelope stretched to touch its left neighbour.
 
     Nothing is drawn over a gap: beside a NaN a column keeps its own extent.
     """

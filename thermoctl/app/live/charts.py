@@ -32,7 +32,7 @@ _DAY_S = 86_400.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """What the charts of a view share: the same column is the same time from top to bottom.
+    """What the charts of a view share: one column is one time in all.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def _off_scale(chart: Frame, outside: braille.Dots, known: braille.Dots, edge: s
 
 
 def deviation(chart: Frame, rows: int) -> list[Text]:
-    """Return the chart of temperature minus set point within ±100 mK, marked where it leaves."""
+    """Return the chart of the deviation within ±100 mK, marked where it leaves."""
     view, look = chart.view, chart.look
     grid, dots = Grid(rows, chart.cells), rows * braille.DOTS_HIGH
     low_mk, high_mk = chart.table[trend.DEVIATION_LOW], chart.table[trend.DEVIATION_HIGH]
@@ -218,7 +218,7 @@ def deviation(chart: Frame, rows: int) -> list[Text]:
 
 
 def power(chart: Frame, rows: int) -> list[Text]:
-    """Return the strip of the accepted power: its mean as an area, its greatest as a dot above."""
+    """Return the strip of accepted power: mean as an area, greatest as a dot."""
     look, dots = chart.look, rows * braille.DOTS_HIGH
     grid = Grid(rows, chart.cells)
     count = chart.table[trend.POWER_COUNT]

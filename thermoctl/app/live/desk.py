@@ -1,4 +1,4 @@
-"""From actions to requests: what a key asks of the loop, and what is asked back before."""
+"""From actions to requests: what a key asks, and what is asked back."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Desk:
         return f"Enter: mode {self._proposed.value}   m: another   Esc: leave it"
 
     def press(self, action: Action, mode: Mode, setpoint_c: float) -> Request | None:
-        """Return what `action` asks of a loop in `mode` with `setpoint_c`; None when nothing yet.
+        """Return what `action` asks of a loop in `mode`; None when nothing yet.
 
         Set points stay within the limits, on whole tenths.
         """

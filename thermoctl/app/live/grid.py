@@ -33,7 +33,7 @@ class Grid:
             self.put(row, 0, line, role)
 
     def free(self, row: int, first: int, last: int) -> bool:
-        """Return whether the cells from `first` to `last`, inclusive, exist and are empty."""
+        """Return whether the cells `first` to `last`, inclusive, exist and are empty."""
         inside = 0 <= row < self.rows and 0 <= first <= last < self.columns
         return inside and all(cell == " " for cell in self._cells[row][first : last + 1])
 

@@ -1,4 +1,4 @@
-"""Single keys of a terminal, as named actions; what an action does is decided elsewhere."""
+"""Single keys of a terminal, as named actions."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _sequence_end(received: bytes, begin: int) -> int | None:
 
 
 def decode(received: bytes) -> tuple[list[Action], bytes]:
-    """Return the actions in `received`, and the begun sequence that is left at its end.
+    """Return the actions in `received`, and what is begun at its end.
 
     Keys without an action, unknown sequences and stray bytes are passed over.
     """
@@ -96,7 +96,7 @@ def decode(received: bytes) -> tuple[list[Action], bytes]:
 
 
 class Keys:
-    """Keys of a terminal as they are pressed; a context that leaves the terminal as it was.
+    """Keys as they are pressed; a context that restores the terminal.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Roles and the looks they get: one hue has one meaning, and shape and word say it as well."""
+"""Roles and their looks: one hue, one meaning, said by shape and word too."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def _style(colour: Colour, role: Role) -> Style:
 
 
 def printable(string: str, *, utf8: bool) -> str:
-    """Return `string` on one line, without control characters; in ASCII where it must be."""
+    """Return `string` on one line without control characters, ASCII if need be."""
     if not utf8:
         string = string.translate(_ASCII)
         string = string.encode("ascii", "replace").decode("ascii")

@@ -1,4 +1,4 @@
-"""What is shown, derived from the cycles of one loop; nothing here knows a terminal."""
+"""What is shown, derived from the cycles of one loop; knows no terminal."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Whiteness:
-    """Lag-one autocorrelation of the innovations, and the limit a white sequence keeps to."""
+    """Lag-one autocorrelation of the innovations, and its limit when white."""
 
     autocorrelation: float
     limit: float
@@ -194,7 +194,7 @@ def _in_sigma(step: Step) -> float:
 
 
 class LiveModel:
-    """Takes the cycles of one loop and gives a `View` at any moment; memory is bounded.
+    """Takes the cycles of one loop, gives a `View` at any moment; bounded.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ class LiveModel:
         self._events.append(sentence(event))
 
     def view(self, now_s: float, prompt: str = "") -> View:
-        """Return what is to be shown at loop time `now_s`, with `prompt` in the row of keys."""
+        """Return what to show at loop time `now_s`, `prompt` in the row of keys."""
         cycle = self._cycle
         self._range_s = max(self._range_s, range_for(now_s - self._first_s))
         return View(

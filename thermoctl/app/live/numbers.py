@@ -1,4 +1,4 @@
-"""How numbers are written: fixed decimals, a true minus, and a dash for what is not known.
+"""How numbers are written: fixed decimals, true minus, dash for unknown.
 
 Decimals depend on the quantity and never on the value, so that a column does not jump. A number
 that is not finite is unknown; it becomes `UNKNOWN` here and so never reaches a screen.
@@ -27,7 +27,7 @@ def number(value: float | None, decimals: int, *, signed: bool = False) -> str:
 
 
 def with_unit(digits: str, unit: str) -> str:
-    """Return `digits` and `unit` with a space that does not break; unknown takes no unit."""
+    """Return `digits` and `unit`, not to be parted; unknown takes no unit."""
     return digits if digits == UNKNOWN else f"{digits}{NBSP}{unit}"
 
 
@@ -63,7 +63,7 @@ def age(value_s: float) -> str:
 
 
 def span(value_s: float) -> str:
-    """Return a length of time in the largest unit it has more than one of: ``60 min``, ``2 h``."""
+    """Return a length of time in its largest unit: ``60 min``, ``2 h``."""
     for unit, length_s in (("d", 86_400.0), ("h", 3600.0), ("min", 60.0)):
         if value_s > length_s:
             return with_unit(number(value_s / length_s, 0), unit)
@@ -71,7 +71,7 @@ def span(value_s: float) -> str:
 
 
 def wall_time(zero: datetime, t_s: float, pattern: str = "%H:%M:%S") -> str:
-    """Return the wall time at loop time `t_s`, where `zero` is the wall time at loop time 0."""
+    """Return the wall time at loop time `t_s`; `zero` is that at 0."""
     try:
         return (zero + timedelta(seconds=t_s)).strftime(pattern)
     except (OverflowError, ValueError):  # NaN, or beyond the calendar

@@ -1,4 +1,4 @@
-"""What the controller believes, with error bars, and how well it does: four rows of two columns."""
+"""What the controller believes, with error bars, and how well it does."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _DOTS = braille.DOTS_HIGH
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """One figure: what it is, its value, how sure, in which unit, and a spark or a word.
+    """One figure: name, value, how sure, unit, and a spark or a word.
 
     Parameters
     ----------

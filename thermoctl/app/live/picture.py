@@ -85,7 +85,7 @@ def _line(line: Text, top: float, page: str) -> Iterator[str]:
 
 
 def svg(rows: Sequence[Text], look: Look, title: str) -> str:
-    """Return `rows`, as `thermoctl.app.live.render.render` gives them, as an SVG document.
+    """Return rendered `rows` as an SVG document.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ def parted(
     width: int,
     ground: Role = Role.PAGE,
 ) -> Text:
-    """Return `left` at the left edge and `right` at the right one; the right one goes first."""
+    """Return `left` and `right` at their edges; the right one goes first."""
     first, last = look.text(*left, ground=ground), look.text(*right)
     gap = width - first.cell_len - last.cell_len
     if gap < (1 if last.cell_len else 0):
@@ -36,7 +36,7 @@ def parted(
 
 
 def ruled(look: Look, title: str, note: str, width: int) -> Text:
-    """Return a hairline with `title` at its left and `note` at its right, the note cut first."""
+    """Return a hairline with `title` and `note`; the note is cut first."""
     head = look.text(("── ", Role.RULE), (title, Role.STRONG), (" ", Role.PAGE))
     tail = look.text((f" {note} " if note else "", Role.MUTE))
     if head.cell_len + tail.cell_len + 2 > width:

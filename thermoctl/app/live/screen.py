@@ -31,7 +31,7 @@ _SYSTEMS = {Colour.TRUE: ColorSystem.TRUECOLOR, Colour.ANSI: ColorSystem.STANDAR
 
 
 def terminal_codes(line: Text, colour: Colour) -> str:
-    """Return `line` with the codes a terminal wants; attributes without hues for NONE."""
+    """Return `line` with a terminal's codes; attributes without hues for NONE."""
     # The styles of NONE hold no hue, so that any system writes none.
     system = _SYSTEMS.get(colour, ColorSystem.STANDARD)
     return "".join(
@@ -46,7 +46,7 @@ def _end_by_signal(number: int, frame: FrameType | None) -> None:
 
 
 class LiveScreen:
-    """Draws a `LiveModel` on the alternate screen; a context that restores the terminal.
+    """Draws a `LiveModel`; a context that restores the terminal.
 
     However the context is left, by an exception, Ctrl-C or a signal that asks the process to end,
     the terminal is as before. The signals are taken only where nobody else handles them, and only

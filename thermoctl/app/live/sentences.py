@@ -107,7 +107,7 @@ def _described(event: Event, fields: Mapping[str, str]) -> str:
 
 
 def sentence(event: Event) -> Sentence:
-    """Return `event` as a person reads it; an unknown name is spelt out with its fields."""
+    """Return `event` as a person reads it; an unknown one with its fields."""
     fields = {name: quantity(name, value) for name, value in event.fields.items()}
     unlisted = Mark.WARNING if event.name.startswith("alarm.") else Mark.NONE
     mark, templates = _SENTENCES.get(event.name, (unlisted, ()))

@@ -1,4 +1,4 @@
-"""A run of any length in bounded memory: minimum, maximum, mean and last value per bucket.
+"""A run of any length in bounded memory, as extremes, mean and last value.
 
 Buckets lie side by side in time from the first sample on. When they are used up, neighbours are
 merged and the buckets are twice as wide; so the whole run is always there, and an extreme is
@@ -74,7 +74,7 @@ class Trend:
         return 2 * (math.floor((end_s - self.origin_s) / (2.0 * column_s)) + 1) - count
 
     def columns(self, end_s: float, column_s: float, count: int) -> Array:
-        """Return the run as `count` columns of `column_s`, the last of them holding `end_s`.
+        """Return the run as `count` columns of `column_s`, up to `end_s`.
 
         Returns
         -------

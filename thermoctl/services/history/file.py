@@ -1,4 +1,4 @@
-"""The history's database file: open it, or set it aside and begin a new one; append to it.
+"""The history's database file: opened or set aside, and appended to.
 
 Everything here may block for seconds and may raise `sqlite3.Error` or `OSError`; only the writer's
 thread calls it.
@@ -51,7 +51,7 @@ Row = tuple[str, tuple[Value, ...]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Opened:
-    """A database ready for rows, and where the one before it went, if it was of no use."""
+    """A database ready for rows, and where a useless one before it went."""
 
     connection: sqlite3.Connection
     set_aside: Path | None = None
@@ -97,7 +97,7 @@ def open_history(
 
 
 class HistoryFile:
-    """One database through failures, set-asides and deletions, with the run its rows belong to."""
+    """One database through failures, set-asides and deletions."""
 
     def __init__(
         self, path: Path, run: RunInfo, wall_clock: Callable[[], float], max_cycles: int

@@ -57,7 +57,7 @@ class RunInfo:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column of ``cycles``: its name with the unit, its type, and where it comes from."""
+    """One column of ``cycles``: name with unit, type, and where it is from."""
 
     name: str
     kind: Kind

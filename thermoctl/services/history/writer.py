@@ -100,11 +100,11 @@ class HistoryWriter:
         self._feed.put((self._wall_clock(), cycle))
 
     def publish_event(self, event: Event, loop: str | None = None) -> None:
-        """Hand over an event that belongs to no cycle, such as ``board.lost``, as cheaply."""
+        """Hand over an event that belongs to no cycle, such as ``board.lost``."""
         self._feed.put((self._wall_clock(), (event, loop)))
 
     def close(self, timeout_s: float = 2.0) -> bool:
-        """Write what waits and close the file; return whether all of it reached the disk in time.
+        """Write what waits and close the file; return whether all was in time.
 
         The thread is a daemon thread: a disk that hangs does not keep the process alive.
         """
