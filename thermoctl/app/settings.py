@@ -6,6 +6,7 @@ Nothing here switches anything on: a configuration is read, checked as a whole a
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from thermoctl.app.wording import reasons, shown, unknown_key, validated, withou
 from thermoctl.errors import ConfigError
 
 ETC = Path("/etc/thermoctl")
+_LOOP_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")  # it names files and topics too
 
 
 class Settings(Table):
@@ -127,8 +129,8 @@ class _Reading:
         for name, table in self._named("loops"):
             self._board_names(name, table)
             loop = loops[name] = self._table(LoopTable, table, ("loops", name))
-            if not name.replace("-", "_").isidentifier():
-                self._blame(("loops", name), "a loop is named with letters, digits, - and _")
+            if not _LOOP_NAME.fullmatch(name):
+                self._blame(("loops", name), "a loop is named with up to 64 of a-z, A-Z, 0-9, - _")
             if isinstance(loop, LoopTable):
                 try:
                     check_parts(loop)

@@ -235,7 +235,7 @@ def test_a_document_that_is_none_is_refused(content, told):
 
 def test_a_name_that_is_no_name_is_refused():
     loop = {"setpoint_c": 37.5, "trip_above_c": 60}
-    assert "named with letters, digits, - and _" in problems({"loops": {"a/b": loop}})[0]
+    assert "named with up to 64 of" in problems({"loops": {"a/b": loop}})[0]
 
 
 # -- where it stands -------------------------------------------------------------------------------
