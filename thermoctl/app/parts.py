@@ -24,6 +24,8 @@ from thermoctl.ports import Controller, Estimator
 from thermoctl.regulator import Limits, Plan
 
 _ARX_EXCITATION_MIN = 0.1
+_ARX_GAIN_SHARE = 0.2
+"""Guarded, a learnt gain is never taken for less than this share of the one that is given."""
 
 
 def plan_for(table: LoopTable) -> Plan:
@@ -37,9 +39,10 @@ def plan_for(table: LoopTable) -> Plan:
     with _within("model", table.model):
         structure = _structure(table.model, table.period_s)
     with _within("estimator", table.estimator):
-        identifier = _identifier(table.estimator, structure, table.setpoint_c)
+        gain_k = table.model.gain_k_per_s * table.period_s
+        identifier = _identifier(table.estimator, structure, table.setpoint_c, gain_k)
     with _within("controller", table.controller):
-        controller = _controller(table, structure)
+        controller = _controller(table, structure, gain_k)
     with _within("", table):
         return Plan(_limits(table), identifier, controller, table.setpoint_c, table.mode)
 
@@ -86,12 +89,24 @@ def _structure(table: ModelTable, period_s: float) -> Arx | KnownGain:
     return Arx(table.n, table.m, y_centre_c=table.centre_c, y_scale_k=table.scale_k)
 
 
-def _identifier(table: EstimatorTable, structure: Arx | KnownGain, setpoint_c: float) -> Identifier:
+def _identifier(
+    table: EstimatorTable, structure: Arx | KnownGain, setpoint_c: float, gain_k: float
+) -> Identifier:
     law = plugins.build(plugins.find(plugins.ESTIMATORS, table.kind), table.options)
-    theta0 = table.theta0
-    if theta0 is None and isinstance(structure, KnownGain):
-        theta0 = (1.0,)  # a plant without loss keeps its temperature
+    theta0 = table.theta0 or _first_guess(structure, gain_k)
     return Identifier(structure, _guarded(law, table, structure, setpoint_c), theta0, table.P0)
+
+
+def _first_guess(structure: Arx | KnownGain, gain_k: float) -> tuple[float, ...]:
+    """Return theta of a plant without loss, which keeps its temperature and which power heats.
+
+    Zeros would be a plant without gain: no power could be computed from it, and without power the
+    gain is never learnt.
+    """
+    if isinstance(structure, KnownGain):
+        return (1.0,)
+    b = gain_k / structure.m * structure.u_scale / structure.y_scale_k
+    return (-1.0,) + (0.0,) * (structure.n - 1) + (b,) * structure.m
 
 
 def _guarded(
@@ -125,11 +140,13 @@ def _covariance_max(table: EstimatorTable, structure: Arx | KnownGain, setpoint_
     return min(table.P0, (structure.b_k / max(abs(setpoint_c), 1.0)) ** 2)
 
 
-def _controller(table: LoopTable, structure: Arx | KnownGain) -> Controller:
+def _controller(table: LoopTable, structure: Arx | KnownGain, gain_k: float) -> Controller:
     law = plugins.find(plugins.CONTROLLERS, table.controller.kind)
-    takes_structure = "structure" in plugins.option_names(law)
-    injected: dict[str, Any] = {"structure": structure} if takes_structure else {}
-    controller: Controller = plugins.build(law, table.controller.options, **injected)
+    known, options = plugins.option_names(law), dict(table.controller.options)
+    injected: dict[str, Any] = {"structure": structure} if "structure" in known else {}
+    if isinstance(structure, Arx) and table.estimator.guards.enabled and "gain_min_k" in known:
+        options.setdefault("gain_min_k", _ARX_GAIN_SHARE * gain_k)
+    controller: Controller = plugins.build(law, options, **injected)
     return controller
 
 

@@ -103,7 +103,10 @@ class EstimatorTable(Options):
 
     kind: str = Field("ckf", description="ckf, nkf, rls, vff, or one from a plug-in.")
     P0: Positive = Field(1.0, description="Variance of the parameters at the start.")
-    theta0: tuple[Finite, ...] | None = Field(None, description="Parameters at the start.")
+    theta0: tuple[Finite, ...] | None = Field(
+        None,
+        description="Parameters at the start; if absent no loss and the model's gain.",
+    )
     guards: GuardsTable = Field(default_factory=GuardsTable)
 
 
@@ -115,7 +118,9 @@ class ModelTable(Table):
         description="known-gain: y(t) = a y(t-1) + b u(t-1), b given; arx: everything learnt.",
     )
     gain_k_per_s: Positive = Field(
-        0.0449, description="known-gain: heating rate at full power; 1,500 W in 8 l gives 0.0449."
+        0.0449,
+        description="Heating rate at full power; 1,500 W in 8 l gives 0.0449. arx: the first "
+        "guess, and a fifth of it the least gain that is believed while the guards are on.",
     )
     n: int = Field(2, ge=1, le=10, description="arx: how many past temperatures.")
     m: int = Field(2, ge=1, le=10, description="arx: how many past powers.")

@@ -96,14 +96,18 @@ class SelfTuningMinimumVariance:
         return None, power if math.isfinite(power) else math.nan
 
     def _power(self, structure: Arx, situation: Situation, reference_c: float) -> float:
-        """Return the power for which ``Arx`` predicts `reference_c`; O21 (23)."""
+        """Return the power for which ``Arx`` predicts `reference_c`; O21 (23).
+
+        Before the start the plant is taken to have rested, and in a gap of the readings to have
+        been where it is now: without a power for so long as n samples it would never be learnt.
+        """
         n, theta = structure.n, situation.estimate.theta
-        y_past_c = situation.y_past_c
+        y_past_c = _known(situation.y_past_c, situation.temperature_c)
         if n > 0:
             y_past_c = np.concatenate(((situation.temperature_c,), y_past_c[1:n]))
         b = theta[n:]
         cancel = _zeros_inside(b, self.zero_radius)
-        u_past = np.concatenate(((0.0,), situation.u_past[: structure.m - 1]))
+        u_past = np.concatenate(((0.0,), _known(situation.u_past, 0.0)[: structure.m - 1]))
         if not cancel:
             u_past[:] = 0.0
         if len(y_past_c) < n or len(u_past) < structure.m:
@@ -164,6 +168,11 @@ class SelfTuningMinimumVariance:
     def ride_s(self) -> float:
         """How long the model may steer without a sensor: Tc, at most 60 s."""
         return min(self.reference_time_s, RIDE_MAX_S)
+
+
+def _known(past: Array, otherwise: float) -> Array:
+    """Return `past` with `otherwise` in place of what is not known."""
+    return np.where(np.isnan(past), otherwise, past)
 
 
 def _zeros_inside(b: Array, radius: float) -> bool:

@@ -67,6 +67,32 @@ def test_structure_arx_has_the_orders_that_are_given(minimal):
     assert (structure.n, structure.m) == (3, 1)
 
 
+@pytest.mark.parametrize("kind", ["ckf", "nkf", "rls"])
+@pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 3), (5, 1)])
+def test_a_loop_that_learns_everything_heats_from_its_first_sample_on(minimal, kind, n, m):
+    tank = minimal["loops"]["tank"]
+    tank["model"] = {"structure": "arx", "n": n, "m": m}
+    tank["estimator"] = {"kind": kind}
+    tank["mode"] = "auto"
+    regulator = regulator_for(load(minimal))
+    for t_s in range(10):
+        step = regulator.step(Measurement(float(t_s), 25.0 + 0.01 * t_s))
+        assert step.command.power > 0.0
+        assert step.alarms == ()
+
+
+def test_a_learnt_gain_is_bounded_from_below_unless_the_guards_are_off(minimal):
+    tank = minimal["loops"]["tank"]
+    tank["model"] = {"structure": "arx", "gain_k_per_s": 0.1}
+    tank["period_s"] = 2.0
+    assert plan_for(load(minimal).loops["tank"]).controller.gain_min_k == pytest.approx(0.04)
+    tank["controller"] = {"kind": "self-tuning-mv", "gain_min_k": 0.01}
+    assert plan_for(load(minimal).loops["tank"]).controller.gain_min_k == 0.01
+    tank["controller"] = "self-tuning-mv"
+    tank["estimator"] = {"guards": {"enabled": False}}
+    assert plan_for(load(minimal).loops["tank"]).controller.gain_min_k == 0.0
+
+
 @pytest.mark.parametrize(
     ("curve", "more", "volts", "temperature_c"),
     [

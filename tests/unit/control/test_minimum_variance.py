@@ -87,7 +87,18 @@ def test_a_missing_newest_sample_is_replaced_by_the_temperature_given_for_it():
     theta = [-1.5, 0.52, 0.1]
     ridden = power(law, theta, 37.2, y=(math.nan, 36.9))
     assert ridden == pytest.approx(power(law, theta, 37.2, y=(37.2, 36.9)))
-    assert math.isnan(power(law, theta, 37.2, y=(37.2, math.nan)))
+
+
+def test_a_reading_that_is_missing_in_the_past_is_taken_to_have_been_this_one():
+    law, theta = SelfTuningMinimumVariance(Arx(3, 1)), [-1.5, 0.42, 0.1, 0.1]
+    gap = power(law, theta, 37.2, y=(37.2, math.nan, 36.9))
+    assert gap == pytest.approx(power(law, theta, 37.2, y=(37.2, 37.2, 36.9)))
+
+
+def test_before_the_start_no_power_was_given():
+    law, theta = SelfTuningMinimumVariance(Arx(1, 3)), [-0.9, 0.1, 0.05, 0.02]
+    first = power(law, theta, u=(0.3, math.nan))
+    assert first == pytest.approx(power(law, theta, u=(0.3, 0.0)))
 
 
 @pytest.mark.parametrize(
@@ -95,7 +106,6 @@ def test_a_missing_newest_sample_is_replaced_by_the_temperature_given_for_it():
     [
         {"temperature_c": math.nan},
         {"setpoint_c": math.nan},
-        {"u": (math.nan,)},
         {"u": (0.1,), "theta": [-0.9, 0.1, 0.05, 0.02]},
         {"theta": [-0.9, 0.0, 0.0]},
     ],
