@@ -67,12 +67,13 @@ def test_structure_arx_has_the_orders_that_are_given(minimal):
     assert (structure.n, structure.m) == (3, 1)
 
 
+@pytest.mark.parametrize("guarded", [True, False])
 @pytest.mark.parametrize("kind", ["ckf", "nkf", "rls"])
 @pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 3), (5, 1)])
-def test_a_loop_that_learns_everything_heats_from_its_first_sample_on(minimal, kind, n, m):
+def test_a_loop_that_learns_everything_heats_from_its_first_sample_on(minimal, guarded, kind, n, m):
     tank = minimal["loops"]["tank"]
     tank["model"] = {"structure": "arx", "n": n, "m": m}
-    tank["estimator"] = {"kind": kind}
+    tank["estimator"] = {"kind": kind, "P0": 1e-6, "guards": {"enabled": guarded}}
     tank["mode"] = "auto"
     regulator = regulator_for(load(minimal))
     for t_s in range(10):
