@@ -10,6 +10,7 @@ import contextlib
 import gc
 import signal
 import threading
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +18,7 @@ from pathlib import Path
 from thermoctl import __version__
 from thermoctl.app.compose import loop_for, started_as
 from thermoctl.app.settings import Settings, default_files, load_all
-from thermoctl.errors import ConfigError, ThermoctlError
+from thermoctl.errors import ConfigError
 from thermoctl.runtime.clock import MonotonicClock
 from thermoctl.services.history.schema import RunInfo
 from thermoctl.services.history.writer import HistoryWriter
@@ -102,7 +103,7 @@ class Daemon:
         self._keeper = LatchKeeper(
             self._latches, self._acknowledged_on_disk, report=self._journal.emit
         )
-        self._confirmed = self._ready = False
+        self._confirmed = self._failed = self._ready = False
         self._ending = self._reloading = False
 
     # -- starting where the last run ended -------------------------------------------------------
@@ -122,7 +123,8 @@ class Daemon:
             else:
                 low_c, high_c = table.setpoint_range_c
                 within = low_c <= record.setpoint_c <= high_c
-                starts[name] = (record.mode, record.setpoint_c if within else table.setpoint_c)
+                mode = Mode.OFF if record.mode is Mode.PROGRAM else record.mode
+                starts[name] = (mode, record.setpoint_c if within else table.setpoint_c)
         return started_as(settings, starts)
 
     def _latched(self, settings: Settings) -> dict[str, Alarm]:
@@ -154,15 +156,35 @@ class Daemon:
             gc.freeze()  # what is loaded now stays: no collection needs to look at it again
             control = threading.Thread(target=self._control, name="control", daemon=True)
             control.start()
-            self._attend(control)
-            self._emit("loop.stopped", None, power_0_confirmed=self._confirmed)
-        return self._confirmed
+            try:
+                self._attend(control)
+            finally:  # whatever ends this thread, the other one ends with power 0
+                self._stop()
+                control.join(_STOP_S)
+                self._say_the_rest()
+                self._emit("loop.stopped", None, power_0_confirmed=self._confirmed)
+        return self._confirmed and not self._failed
 
     def _control(self) -> None:
         try:
             self._loop.run()
+        except BaseException as error:  # noqa: BLE001 - a thread ends in silence, this one must not
+            self._failed = True
+            text = f"{type(error).__name__}: {error}"
+            self._emit("loop.failed", None, error=text, trace=traceback.format_exc())
         finally:
             self._confirmed = self._loop.shut_down()
+
+    def _stop(self) -> None:
+        """End the loop after the cycle that is under way; called by a signal handler, too."""
+        self._ending = True
+        self._loop.stop()
+        self._clock.interrupt()
+
+    def _say_the_rest(self) -> None:
+        """Hand on what was reported after the last published cycle."""
+        for event in self._loop.take_events():
+            self._emit(event.name, None, **event.fields)
 
     def _attend(self, control: threading.Thread) -> None:
         """Look after signals and the disk until the control thread has ended."""
@@ -185,9 +207,7 @@ class Daemon:
         if number == signal.SIGHUP:
             self._reloading = True
         else:
-            self._ending = True
-            self._loop.stop()
-            self._clock.interrupt()
+            self._stop()
 
     def _store_runs(self) -> None:
         for name, cycle in list(self._seen.cycles.items()):
@@ -202,14 +222,14 @@ class Daemon:
     # -- called by the loop's thread ---------------------------------------------------------------
 
     def _publish(self, cycle: Cycle) -> None:
-        self._seen.cycles[cycle.loop] = cycle
-        for event in cycle.step.events:
-            self._journal.emit(event, cycle.loop)
         latched = next((alarm for alarm in cycle.step.alarms if alarm.latched), None)
         if latched is None:
             self._keeper.cleared(cycle.loop)
         else:
             self._keeper.latched(cycle.loop, latched)
+        self._seen.cycles[cycle.loop] = cycle
+        for event in cycle.step.events:
+            self._journal.emit(event, cycle.loop)
         if self._history is not None:
             self._history.publish(cycle)
 
@@ -232,15 +252,15 @@ class Daemon:
         self._notifier.reloading()
         try:
             fresh = load_all(self._files)
+            setpoints = {f"loops.{name}.setpoint_c": name for name in self._settings.loops}
             changed = _changed_keys(self._settings, fresh)
-            beyond = [key for key in changed if not key.endswith(".setpoint_c")]
+            beyond = [key for key in changed if key not in setpoints]
             if beyond:
                 raise ConfigError(f"a restart is needed to change {', '.join(beyond)}")
-        except ThermoctlError as error:
-            self._emit("config.refused", None, why=str(error))
+        except Exception as error:  # noqa: BLE001 - whatever a file can do, control goes on
+            self._emit("config.refused", None, why=str(error) or type(error).__name__)
         else:
-            for key in changed:
-                name = key.split(".")[1]
+            for name in (setpoints[key] for key in changed):
                 self._loop.ask(SetPoint(fresh.loops[name].setpoint_c), name)
             self._settings = fresh
             self._emit("config.loaded", None, changed=changed)

@@ -52,9 +52,9 @@ class AlarmRegister:
                 self._put(replace(row, acknowledged=True))
         return tuple(row.code for row in met if row.latched or not row.acknowledged)
 
-    def latched(self) -> Alarm | None:
-        """Return the alarm that holds the heater off, if there is one."""
-        return next((row for row in self._rows.values() if row.latched), None)
+    def latched(self) -> tuple[Alarm, ...]:
+        """Return the alarms that hold the heater off until they are acknowledged."""
+        return tuple(row for row in self._rows.values() if row.latched)
 
     def _put(self, row: Alarm) -> None:
         self._rows[row.code] = row

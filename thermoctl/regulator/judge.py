@@ -14,9 +14,9 @@ from thermoctl.quantities import is_finite_number
 from thermoctl.regulator.limits import Limits
 from thermoctl.signals import Measurement, Quality
 
-_STEP_MEMORY = 0.05  # weight of the newest step: some twenty samples
-_STEP_FACTOR = 8.0  # a step this many times the usual one is an outlier
-_STEP_CLIP = 4.0  # and counts no more than so many thresholds when the usual step is learnt
+_STEPS = 24  # steps between readings that are remembered
+_STEP_FACTOR = 16.0  # five standard deviations of a step, were the noise normal
+_THRESHOLDS_MAX = 20.0  # noise moves the threshold up to so many times `Limits.jump_k`
 
 
 class Verdict(StrEnum):
@@ -45,15 +45,23 @@ class Judged:
         The last outlier, NaN when there is none.
     outliers : int
         Outliers in a row.
-    usual_step_k : float
-        Running mean of the distance between neighbouring readings.
+    steps_k : tuple of float
+        Distance from the last good reading of the latest readings, oldest first.
     """
 
     verdict: Verdict = Verdict.MISSING
     last_good_c: float = math.nan
     suspect_c: float = math.nan
     outliers: int = 0
-    usual_step_k: float = 0.0
+    steps_k: tuple[float, ...] = ()
+
+    @property
+    def usual_step_k(self) -> float:
+        """Lower quartile of the latest steps: spikes leave it alone, noise moves it.
+
+        A mean would be drawn along by spikes until they were usual themselves.
+        """
+        return sorted(self.steps_k)[len(self.steps_k) // 4] if self.steps_k else 0.0
 
 
 def judge(memory: Judged, measurement: Measurement, limits: Limits) -> Judged:
@@ -62,7 +70,8 @@ def judge(memory: Judged, measurement: Measurement, limits: Limits) -> Judged:
     An outlier is believed when it repeats: after two in a row, a third that agrees with the one
     before it means that the water has jumped, as it does when a jug of cold water goes in.
     """
-    circuit = _CIRCUIT.get(measurement.quality)
+    quality = measurement.quality  # a plug-in's may be anything, even what has no hash
+    circuit = _CIRCUIT.get(quality) if isinstance(quality, str) else None
     if circuit is not None:
         return replace(memory, verdict=circuit)
     temperature_c = measurement.temperature_c
@@ -71,7 +80,7 @@ def judge(memory: Judged, measurement: Measurement, limits: Limits) -> Judged:
     # Too hot is believed at once, from a stale reading as well: it only ever costs heat.
     if temperature_c > limits.trip_above_c:
         return replace(memory, verdict=Verdict.OVER)
-    if measurement.quality is not Quality.GOOD:
+    if quality is not Quality.GOOD:
         return replace(memory, verdict=Verdict.MISSING)
     judged = _judge_step(memory, temperature_c, limits)
     if judged.verdict is Verdict.GOOD and temperature_c < limits.trip_below_c:
@@ -85,15 +94,13 @@ _CIRCUIT = {Quality.OPEN: Verdict.OPEN, Quality.SHORT: Verdict.SHORT}
 def _judge_step(memory: Judged, temperature_c: float, limits: Limits) -> Judged:
     if math.isnan(memory.last_good_c):
         return Judged(Verdict.GOOD, last_good_c=temperature_c)
-    threshold_k = max(limits.jump_k, _STEP_FACTOR * memory.usual_step_k)
+    widened_k = min(_STEP_FACTOR * memory.usual_step_k, _THRESHOLDS_MAX * limits.jump_k)
+    threshold_k = max(limits.jump_k, widened_k)
     step_k = abs(temperature_c - memory.last_good_c)
-    learnt_k = min(step_k, _STEP_CLIP * threshold_k)
-    usual_step_k = memory.usual_step_k + _STEP_MEMORY * (learnt_k - memory.usual_step_k)
+    steps_k = (*memory.steps_k[1 - _STEPS :], step_k)
     repeated = (
         memory.outliers >= limits.OUTLIERS and abs(temperature_c - memory.suspect_c) <= threshold_k
     )
     if step_k <= threshold_k or repeated:
-        return Judged(Verdict.GOOD, temperature_c, usual_step_k=usual_step_k)
-    return Judged(
-        Verdict.SPIKE, memory.last_good_c, temperature_c, memory.outliers + 1, usual_step_k
-    )
+        return Judged(Verdict.GOOD, temperature_c, steps_k=steps_k)
+    return Judged(Verdict.SPIKE, memory.last_good_c, temperature_c, memory.outliers + 1, steps_k)

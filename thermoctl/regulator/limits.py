@@ -77,9 +77,13 @@ class Limits:
         """How long the last output is kept without a reading; a slow loop may miss one sample."""
         return max(self.HOLD_S, 1.5 * self.period_s)
 
+    def seen_s(self, interval_s: float) -> float:
+        """Return how much of the time since the last sample a good reading answers for."""
+        return min(interval_s, self.hold_s)
+
     def valid_until_s(self, t_s: float) -> float:
         """Return when a command given at `t_s` expires: half a period late, and one second."""
-        return t_s + 1.5 * self.period_s + 1.0
+        return t_s + command_lasts_s(self.period_s)
 
     def accept_setpoint(self, value: object) -> float:
         """Return `value` as a set point in degC; raise `Refused` naming the range if it is none."""
@@ -90,6 +94,11 @@ class Limits:
         if not self.setpoint_min_c <= number <= self.setpoint_max_c:
             raise Refused(f"expected {allowed}, got {number:g}")
         return number
+
+
+def command_lasts_s(period_s: float) -> float:
+    """Return how long a command may outlive its sample, for a loop of this period."""
+    return 1.5 * period_s + 1.0
 
 
 def accept_power(value: object) -> float:

@@ -56,6 +56,11 @@ class Plan:
         Set point at the start, in degC.
     mode : Mode
         Mode at the start.
+
+    Raises
+    ------
+    ValueError
+        The mode is PROGRAM: there is none to begin with.
     """
 
     limits: Limits
@@ -63,6 +68,10 @@ class Plan:
     controller: Controller
     setpoint_c: float
     mode: Mode = Mode.OFF
+
+    def __post_init__(self) -> None:
+        if self.mode is Mode.PROGRAM:
+            raise ValueError("mode must be off, manual or auto at the start, got 'program'")
 
 
 class Regulator:
@@ -148,15 +157,16 @@ class Regulator:
         """Return what is made of `measurement`; never raises, whatever a sensor can produce."""
         t_s, interval_s = self._time(measurement.t_s)
         applied = self._applied_power()
-        verdict = self._supervisor.judge(measurement, t_s)
+        verdict = self._supervisor.judge(measurement, t_s, interval_s)
         temperature_c = float(measurement.temperature_c) if verdict is Verdict.GOOD else math.nan
-        self._identify(temperature_c, applied * interval_s / self._limits.period_s, t_s)
-        self._holding = self._holding.after(temperature_c - self._setpoint_c, applied, interval_s)
+        self._identify(temperature_c, self._given(applied, interval_s), t_s)
+        seen_s = self._limits.seen_s(interval_s)
+        self._holding = self._holding.after(temperature_c - self._setpoint_c, applied, seen_s)
         situation = self._situation(t_s, interval_s, applied)
         beliefs = self._beliefs(situation)
         state = self._supervisor.rule(t_s, self._ride_s(situation, beliefs))
         asked, reason = self._ask(situation, state, beliefs)
-        self._command = self._supervisor.bound(asked, reason, t_s, interval_s)
+        self._command = self._supervisor.bound(asked, reason, t_s)
         self._notice_unknown_power(t_s)
         self._applied = None
         return self._finish(measurement, situation, beliefs)
@@ -187,19 +197,29 @@ class Regulator:
     def _applied_power(self) -> float:
         return self._command.power if self._applied is None else self._applied
 
+    def _given(self, applied: float, interval_s: float) -> float:
+        """Return what was given since the last sample, in power times nominal periods.
+
+        Commands expire, so after a long gap nobody knows what was: NaN, and nothing is learnt.
+        """
+        period_s = self._limits.period_s
+        known = interval_s <= max(self._limits.RIDE_S, 10.0 * period_s)
+        return applied * interval_s / period_s if known else math.nan
+
     def _time(self, t_s: float) -> tuple[float, float]:
         """Return the time of this step, and since the last; time that stands still goes on anyway.
 
         Patience with a lost sensor is counted in this time, so it must never stop.
         """
-        period_s = self._limits.period_s
-        before_s = self._t_s
-        if not is_finite_number(t_s):
-            t_s = 0.0 if before_s is None else before_s + period_s
-        elif before_s is not None and t_s <= before_s:
-            t_s = before_s + period_s
-        self._t_s = float(t_s)
-        return self._t_s, period_s if before_s is None else self._t_s - before_s
+        period_s, before_s = self._limits.period_s, self._t_s
+        if before_s is None:
+            self._t_s = float(t_s) if is_finite_number(t_s) else 0.0
+            return self._t_s, period_s
+        if is_finite_number(t_s) and t_s > before_s:
+            self._t_s = float(t_s)
+            return self._t_s, self._t_s - before_s
+        self._t_s = before_s + period_s  # lost in rounding where a time is absurd, hence:
+        return self._t_s, period_s
 
     def _identify(self, temperature_c: float, applied: float, t_s: float) -> None:
         """Learn from the sample; a belief that is not finite is never kept.
@@ -210,13 +230,15 @@ class Regulator:
         seen = not math.isnan(temperature_c)
         last = before if self._foreseen is None else self._foreseen
 
-        def learn() -> tuple[IdentifierBelief, IdentifierBelief | None]:
+        def learn() -> tuple[IdentifierBelief, IdentifierBelief | None, bool]:
             foreseen = None if seen else identifier.foresee(last, applied)
-            return identifier.update(before, temperature_c, applied), foreseen
+            after = identifier.update(before, temperature_c, applied)
+            estimate = after.estimate
+            return after, foreseen, math.isfinite(float(estimate.theta.sum() + estimate.P.sum()))
 
-        kept: tuple[IdentifierBelief, IdentifierBelief | None] = (before, None)
-        after, self._foreseen = self._guarded(learn, kept, "estimator.failed", t_s)
-        if math.isfinite(float(after.estimate.theta.sum() + after.estimate.P.sum())):
+        kept: tuple[IdentifierBelief, IdentifierBelief | None, bool] = (before, None, True)
+        after, self._foreseen, finite = self._guarded(learn, kept, "estimator.failed", t_s)
+        if finite:
             self._identified = after
         else:
             text = "expected finite parameters, went back to the last good ones"
@@ -237,15 +259,23 @@ class Regulator:
 
     def _ride_s(self, situation: Situation, beliefs: Beliefs) -> float:
         """Return how long the model may steer without a sensor: 0 until it is known."""
-        known = beliefs.holding_power is not None and math.isfinite(situation.temperature_c)
-        return self._plan.controller.ride_s if known and self._mode is Mode.AUTO else 0.0
+        known = is_finite_number(beliefs.holding_power) and math.isfinite(situation.temperature_c)
+        if not known or self._mode is not Mode.AUTO:
+            return 0.0
+        return self._guarded(
+            lambda: clamp(self._plan.controller.ride_s, 0.0, self._limits.RIDE_S),
+            0.0,
+            "controller.failed",
+            situation.t_s,
+        )
 
-    def _ask(self, situation: Situation, state: State, beliefs: Beliefs) -> tuple[float, str]:
+    def _ask(self, situation: Situation, state: State, beliefs: Beliefs) -> tuple[object, str]:
         """Return the power that mode, state and controller ask for, and who asked."""
         if self._mode is Mode.OFF:
             return 0.0, "off"
         if state is State.HOLD:
-            return self._supervisor.last_power, "hold"
+            held = self._supervisor.last_power
+            return (min(held, self._manual_power) if self._mode is Mode.MANUAL else held), "hold"
         if self._mode is Mode.MANUAL:
             return self._manual_power, "manual"
         if state in (State.SAFE, State.LATCHED):
@@ -253,31 +283,32 @@ class Regulator:
         if not math.isfinite(situation.temperature_c):
             return 0.0, "unknown"
         asked = self._decide(situation)
-        if state is State.RIDE:
-            return min(asked, beliefs.holding_power or 0.0), "ride"
+        if state is State.RIDE and is_finite_number(asked):
+            holding = clamp(beliefs.holding_power or 0.0, 0.0, 1.0)
+            return clamp(float(asked), 0.0, holding), "ride"  # type: ignore[arg-type]
         return asked, "control"
 
-    def _decide(self, situation: Situation) -> float:
+    def _decide(self, situation: Situation) -> object:
         before = self._control
-        self._control, asked = self._guarded(
-            lambda: self._plan.controller.decide(before, situation),
-            (before, 0.0),
-            "controller.failed",
-            situation.t_s,
-        )
+
+        def decide() -> tuple[Any, object]:
+            after, asked = self._plan.controller.decide(before, situation)
+            return after, asked
+
+        failed: tuple[Any, object] = (before, 0.0)
+        self._control, asked = self._guarded(decide, failed, "controller.failed", situation.t_s)
         return asked
 
     def _beliefs(self, situation: Situation) -> Beliefs:
         """Return the controller's words; where its model is vague, holding power as observed."""
-        beliefs = self._guarded(
-            lambda: self._plan.controller.beliefs(self._control, situation),
-            Beliefs(),
-            "controller.failed",
-            situation.t_s,
-        )
-        if beliefs.holding_power is None and self._holding.known is not None:
-            return replace(beliefs, holding_power=self._holding.known)
-        return beliefs
+
+        def observed() -> Beliefs:
+            beliefs = self._plan.controller.beliefs(self._control, situation)
+            if beliefs.holding_power is None and self._holding.known is not None:
+                return replace(beliefs, holding_power=self._holding.known)
+            return beliefs
+
+        return self._guarded(observed, Beliefs(), "controller.failed", situation.t_s)
 
     def _guarded(self, call: Callable[[], T], otherwise: T, code: str, t_s: float) -> T:
         """Return what a law returns; one that raises costs power 0 in this cycle, never the loop.

@@ -11,6 +11,12 @@ HOLD        the last one                            RUN at a good reading, SAFE 
 SAFE        0                                       RUN after 30 s of good readings
 LATCHED     0                                       SAFE when acknowledged and the cause gone
 ==========  ======================================  ==========================================
+
+How long is too long is counted in seconds without a reading, and a good reading pays back only the
+time it stands for. A sensor that answers once a minute therefore cannot renew RIDE or HOLD for
+ever, while one that drops every other sample is controlled on the rest. All of it is added up from
+the intervals between samples and not read off their times, so that no jump of those times makes
+patience longer.
 """
 
 from __future__ import annotations
@@ -20,7 +26,7 @@ from collections import deque
 from collections.abc import Callable
 
 from thermoctl.errors import Refused
-from thermoctl.quantities import clamp
+from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.judge import Judged, Verdict, judge
 from thermoctl.regulator.limits import Limits
@@ -31,6 +37,7 @@ _TRIPS = {
     Verdict.OVER: ("trip.over_temperature", 9),
     Verdict.UNDER: ("trip.under_temperature", None),
 }
+_SENSOR_CODES = tuple(code for code, _ in (*_CIRCUITS.values(), *_TRIPS.values()))
 _FAILED_IN_A_ROW = 2
 
 Emit = Callable[..., None]
@@ -54,9 +61,11 @@ class Supervisor:
         self._emit = emit
         self._judged = Judged()
         self._reading = math.nan
-        self._good_since_s: float | None = None
-        self._last_good_s: float | None = None
+        self._good_s = 0.0  # good readings without a break
+        self._blind_s = 0.0  # time without a good reading that was not paid back yet
+        self._interval_s = 0.0
         self._tripping: Verdict | None = None
+        self._tripped_lately = False
         self._opened_s: deque[float] = deque(maxlen=limits.OPEN_COUNT)
         self._excess = 0
         self._last_power = 0.0
@@ -68,19 +77,20 @@ class Supervisor:
 
     # -- judging ---------------------------------------------------------------------------------
 
-    def judge(self, measurement: Measurement, t_s: float) -> Verdict:
-        """Return what `measurement` is worth, and remember it."""
+    def judge(self, measurement: Measurement, t_s: float, interval_s: float) -> Verdict:
+        """Return what `measurement`, `interval_s` after the last one, is worth; remember it."""
         before = self._judged.verdict
         self._judged = judge(self._judged, measurement, self.limits)
         self._reading = measurement.temperature_c
+        self._interval_s = interval_s
         verdict = self._judged.verdict
         if verdict is Verdict.GOOD:
-            self._last_good_s = t_s
-            self._good_since_s = t_s if self._good_since_s is None else self._good_since_s
+            seen_s = self.limits.seen_s(interval_s)
+            self._good_s += seen_s if before is Verdict.GOOD else 0.0
+            self._blind_s = max(0.0, self._blind_s - seen_s)
         else:
-            self._good_since_s = None
-        if self._last_good_s is None:
-            self._last_good_s = t_s  # patience with a sensor that never answered starts here
+            self._good_s = 0.0
+            self._blind_s += interval_s
         if verdict is Verdict.SPIKE:
             self._emit("sensor.spike", temperature_c=self._reading, ignored=self._judged.outliers)
         if verdict is Verdict.OPEN and before is not Verdict.OPEN:
@@ -97,7 +107,7 @@ class Supervisor:
         elif verdict in _CIRCUITS:
             self._circuit(verdict, t_s)
         elif verdict is Verdict.GOOD:
-            self._good(t_s)
+            self._good()
         else:
             self._blind(t_s, ride_s if verdict is Verdict.MISSING else 0.0)
         return self.state
@@ -111,8 +121,11 @@ class Supervisor:
         )
         if self._tripping is verdict:
             self.latch(code, fault, text, t_s)
-        else:
+        elif self._tripped_lately:  # good readings in between: one of the two is lying
             self._tripping = verdict
+            self.fail(code, fault, text, t_s)
+        else:
+            self._tripping, self._tripped_lately = verdict, True
             self._raise(code, fault, text, t_s)
             if self.state in (State.RUN, State.RIDE):
                 self._enter(State.HOLD, code)
@@ -127,30 +140,28 @@ class Supervisor:
         if verdict is Verdict.OPEN and often:
             self.latch(code, fault, f"open {len(times)} times in {times[-1] - times[0]:.0f} s", t_s)
 
-    def _good(self, t_s: float) -> None:
+    def _good(self) -> None:
         self._tripping = None
-        for code in (
-            "sensor.open",
-            "sensor.short",
-            "sensor.missing",
-            *(c for c, _ in _TRIPS.values()),
-        ):
+        settled = self._good_s >= self.limits.RETURN_S
+        self._tripped_lately = self._tripped_lately and not settled
+        for code in _SENSOR_CODES:
             self.alarms.clear(code)
-        good_s = t_s - (t_s if self._good_since_s is None else self._good_since_s)
+        if self._blind_s == 0.0:
+            self.alarms.clear("sensor.missing")
         if self.state in (State.RIDE, State.HOLD):
             self._enter(State.RUN, "sensor.good")
-        elif self.state is State.SAFE and good_s >= self.limits.RETURN_S:
+        elif self.state is State.SAFE and settled:
+            self._blind_s = 0.0
             for row in self.alarms.rows():
                 self.alarms.clear(row.code)
             self._enter(State.RUN, "sensor.good")
 
     def _blind(self, t_s: float, ride_s: float) -> None:
         """No reading to act on: ride on the model, else hold, else be safe."""
-        blind_s = t_s - (t_s if self._last_good_s is None else self._last_good_s)
-        ride_s = min(ride_s, self.limits.RIDE_S)
-        rides, holds = blind_s < ride_s, blind_s < self.limits.hold_s
-        if not (rides or holds) or blind_s >= self.limits.RIDE_ALARM_S:
-            text = f"expected a reading every {self.limits.period_s:g} s, none for {blind_s:.0f} s"
+        limits, blind_s = self.limits, self._blind_s
+        rides, holds = blind_s < min(ride_s, limits.RIDE_S), blind_s < limits.hold_s
+        if not (rides or holds) or blind_s >= limits.RIDE_ALARM_S:
+            text = f"expected a reading every {limits.period_s:g} s, none for {blind_s:.0f} s"
             self._raise("sensor.missing", 16, text, t_s, priority=1 if not rides else 2)
         if self.state in (State.SAFE, State.LATCHED):
             return
@@ -162,7 +173,7 @@ class Supervisor:
     def fail(self, code: str, fault: int | None, text: str, t_s: float) -> None:
         """Go to SAFE for the fault `code`; good readings for 30 s end it."""
         self._raise(code, fault, text, t_s)
-        self._good_since_s = None
+        self._good_s = 0.0
         if self.state is not State.LATCHED:
             self._enter(State.SAFE, code)
 
@@ -173,20 +184,21 @@ class Supervisor:
 
     def acknowledge(self, code: str | None) -> None:
         """Acknowledge an alarm, or all; raise `Refused` while the cause of a latch persists."""
-        latched = self.alarms.latched()
-        if latched is not None and code in (None, latched.code):
-            if self.verdict in _CIRCUITS or self.verdict in _TRIPS:
-                raise Refused(f"{latched.code} still stands: {latched.text}")
-            self._tripping = None
-            self._opened_s.clear()
-            self._enter(State.SAFE, "latch.cleared")
+        meant = [row for row in self.alarms.latched() if code in (None, row.code)]
+        if meant and (self.verdict in _CIRCUITS or self.verdict in _TRIPS):
+            raise Refused(f"{meant[0].code} still stands: {meant[0].text}")
         for each in self.alarms.acknowledge(code):
             self._emit("alarm.acknowledged", code=each)
+        if meant and not self.alarms.latched():  # the last one; any other goes on latching
+            self._tripping = None
+            self._good_s = 0.0
+            self._opened_s.clear()
+            self._enter(State.SAFE, "latch.cleared")
 
     # -- power -----------------------------------------------------------------------------------
 
-    def bound(self, asked: float, reason: str, t_s: float, interval_s: float) -> Command:
-        """Return the command for the power a controller `asked` for; NaN becomes 0.
+    def bound(self, asked: object, reason: str, t_s: float) -> Command:
+        """Return the command for the power a controller `asked` for; what is no number becomes 0.
 
         The one place where limits hold. Falling is never slowed; nothing at all passes in SAFE,
         LATCHED or while a trip waits to be confirmed.
@@ -195,10 +207,10 @@ class Supervisor:
             power, reason = 0.0, self._why_off()
         elif self._tripping is not None:
             power, reason = 0.0, _TRIPS[self._tripping][0]
-        elif not math.isfinite(asked):
+        elif not is_finite_number(asked):
             power, reason = 0.0, "output.nan"
         else:
-            power, reason = self._limited(asked, reason, interval_s)
+            power, reason = self._limited(float(asked), reason)  # type: ignore[arg-type]
         self._last_power = power
         return Command(power, self.limits.valid_until_s(t_s), reason)
 
@@ -207,11 +219,11 @@ class Supervisor:
         """The power of the last command."""
         return self._last_power
 
-    def _limited(self, asked: float, reason: str, interval_s: float) -> tuple[float, str]:
+    def _limited(self, asked: float, reason: str) -> tuple[float, str]:
         power = clamp(asked, 0.0, self.limits.power_max)
         if power != asked:
             reason = "limit.high" if asked > power else "limit.low"
-        step = self.limits.rise_per_s * interval_s
+        step = self.limits.rise_per_s * self.limits.seen_s(self._interval_s)
         if power > self._last_power + step:
             return self._last_power + step, "limit.rate"
         return power, reason

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import threading
+import traceback
 from collections.abc import Callable, Mapping
+from typing import TypeVar
 
-from thermoctl.errors import DriverError, LinkError, WrongDevice
+from thermoctl.errors import DriverError, LinkError, TransientError, WrongDevice
 from thermoctl.ports import Board, Clock
 from thermoctl.signals import RawSample
 
 OPEN_S = 5.0
+SILENT_S = 10.0
+"""A board that has not answered at all for this long is taken for lost, and opened anew."""
 _RETRY_FIRST_S, _RETRY_LAST_S = 1.0, 30.0
+_NOT_YET = "not opened yet"
 
 Report = Callable[..., None]
+T = TypeVar("T")
 
 
 class Connection:
@@ -49,46 +55,71 @@ class Connection:
         self._board: Board | None = None
         self._opening: threading.Thread | None = None
         self._opened: Board | DriverError | None = None
+        self._closed = False
+        self._driven = False
+        self._answered_s = float("-inf")
         self._retry_s = _RETRY_FIRST_S
         self._next_try_s = float("-inf")
-        self.last_error = "not opened yet"
+        self.last_error = _NOT_YET
 
     @property
     def board(self) -> Board | None:
         """The open board, None while there is none."""
         return self._board
 
+    @property
+    def awaited(self) -> bool:
+        """Whether its first opening is still under way, so that nothing has failed yet."""
+        return self._board is None and self.last_error == _NOT_YET
+
+    @property
+    def driven(self) -> bool:
+        """Whether an output may be on: a power was asked for, and no 0 confirmed since."""
+        return self._driven
+
     def read(self, deadline_s: float) -> Mapping[str, RawSample]:
         """Return every input of the board; raise a `DriverError` when it did not answer."""
         board = self._connected()
-        try:
-            return board.read(deadline_s)
-        except LinkError as error:
-            self._lose(error)
-            raise
+        return self._exchanged(lambda: board.read(deadline_s))
 
     def write(
         self, outputs: Mapping[str, float], valid_for_s: float, deadline_s: float
     ) -> Mapping[str, float]:
         """Set `outputs` and return what the board took; raise a `DriverError` when it refused."""
         board = self._connected()
-        try:
-            return board.write(outputs, valid_for_s, deadline_s)
-        except LinkError as error:
-            self._lose(error)
-            raise
+        zero = not any(outputs.values())
+        self._driven = self._driven or not zero
+        taken = self._exchanged(lambda: board.write(outputs, valid_for_s, deadline_s))
+        if zero and all(taken.get(name) == 0.0 for name in outputs):
+            self._driven = False
+        return taken
 
     def close(self) -> None:
         """Let the board go, safe values first; a thread that is still opening closes its own."""
-        self._next_try_s = float("inf")
+        self._closed = True
         if self._opening is not None:
             self._opening.join(timeout=0.2)
             self._collect()
-        if self._board is not None:
-            self._board.close()
-            self._board = None
+        self._let_go()
 
     # -- coming and going ------------------------------------------------------------------------
+
+    def _exchanged(self, exchange: Callable[[], Mapping[str, T]]) -> Mapping[str, T]:
+        """Return what the board answers; one whose link is gone, or silent for long, is let go."""
+        try:
+            answer = exchange()
+        except LinkError as error:
+            self._lose(error)
+            raise
+        except TransientError as error:
+            silent_s = self._clock.now_s() - self._answered_s
+            if silent_s < SILENT_S:
+                raise
+            lost = LinkError(f"no answer for {silent_s:.0f} s: {error}")
+            self._lose(lost)
+            raise lost from error
+        self._answered_s = self._clock.now_s()
+        return answer
 
     def _connected(self) -> Board:
         if self._board is None:
@@ -99,6 +130,8 @@ class Connection:
 
     def _advance(self) -> None:
         """Take what a thread has opened, or begin another try when it is time."""
+        if self._closed:
+            return
         if self._opening is None and self._clock.now_s() >= self._next_try_s:
             if not self._beside:
                 self._opened = self._open()
@@ -112,28 +145,35 @@ class Connection:
             self._collect()
 
     def _open_beside(self) -> None:
-        self._opened = self._open()
+        opened = self._open()
+        if self._closed and not isinstance(opened, DriverError):
+            self._close_quietly(opened)  # nobody waits for it any more
+        else:
+            self._opened = opened
 
     def _open(self) -> Board | DriverError:
         board: Board | None = None
         try:
             board = self._build()
             identity = board.open(self._clock.now_s() + OPEN_S)
-        except (DriverError, OSError) as error:
+        except Exception as error:  # noqa: BLE001 - drivers come from entry points
             if board is not None:
-                board.close()
-            return error if isinstance(error, DriverError) else LinkError(str(error))
+                self._close_quietly(board)
+            if isinstance(error, DriverError):
+                return error
+            if not isinstance(error, OSError):
+                self._report("board.failed", board=self.name, trace=traceback.format_exc())
+            return LinkError(f"{type(error).__name__}: {error}")
         self._report("board.opened", board=self.name, kind=identity.kind, version=identity.version)
         return board
 
     def _collect(self) -> None:
         opened, self._opened, self._opening = self._opened, None, None
         if opened is None:
-            return
+            opened = LinkError("opening it has not come to an end")
         if not isinstance(opened, DriverError):
-            self._board, self._retry_s = opened, _RETRY_FIRST_S
-            if self._next_try_s == float("inf"):  # closed while it was opening
-                self.close()
+            self._board, self._retry_s, self._driven = opened, _RETRY_FIRST_S, False
+            self._answered_s = self._clock.now_s()
             return
         self.last_error = str(opened)
         event = "board.wrong" if isinstance(opened, WrongDevice) else "board.retry"
@@ -141,14 +181,23 @@ class Connection:
         self._wait()
 
     def _wait(self) -> None:
-        if self._next_try_s != float("inf"):
-            self._next_try_s = self._clock.now_s() + self._retry_s
-            self._retry_s = min(2.0 * self._retry_s, _RETRY_LAST_S)
+        self._next_try_s = self._clock.now_s() + self._retry_s
+        self._retry_s = min(2.0 * self._retry_s, _RETRY_LAST_S)
 
     def _lose(self, error: LinkError) -> None:
         self.last_error = str(error)
         self._report("board.lost", board=self.name, error=self.last_error)
+        self._let_go()
+        self._wait()
+
+    def _let_go(self) -> None:
         board, self._board = self._board, None
         if board is not None:
+            self._close_quietly(board)
+
+    def _close_quietly(self, board: Board) -> None:
+        """Close `board`; one that breaks its promise not to raise must not keep others on."""
+        try:
             board.close()
-        self._wait()
+        except Exception:  # noqa: BLE001 - drivers come from entry points
+            self._report("board.failed", board=self.name, trace=traceback.format_exc())

@@ -10,21 +10,27 @@ import math
 import queue
 import time
 import traceback
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from thermoctl.errors import DriverError, LinkError, Refused
+from thermoctl.errors import DriverError, FaultError, LinkError, Refused
 from thermoctl.model.actuator import ActuatorLaw
 from thermoctl.model.sensor import Sensor
 from thermoctl.ports import Clock, Simulated
+from thermoctl.quantities import is_finite_number
 from thermoctl.regulator import Regulator
+from thermoctl.regulator.limits import command_lasts_s
 from thermoctl.runtime.connection import Connection
-from thermoctl.signals import Cycle, Event, RawSample, Request, Step
+from thermoctl.signals import Cycle, Event, Measurement, Quality, RawSample, Request, Step
 
 EXCHANGE_S = 0.2
 """No exchange with a board may take longer; a hanging one costs one sample, not the deadline."""
 SUSPENDED_S = 3.0
 """A wake later than this means the machine slept: power 0 before anything else."""
+FRESH_S = 3.0
+"""A sample older than this, or than one and a half periods of a slow loop, is STALE."""
+_EVENTS = 256
 
 Publish = Callable[[Cycle], None]
 
@@ -57,7 +63,8 @@ class Loop:
     publish : callable
         Takes every finished `Cycle`; must return at once.
     completed : callable
-        Called after every completed cycle, never after a failed one: feeds the watchdog.
+        Called after every completed cycle, never after one in which something failed that no
+        driver and no law may do: feeds the watchdog.
     """
 
     def __init__(
@@ -75,7 +82,10 @@ class Loop:
         self._clock, self._period_s = clock, period_s
         self._publish, self._completed = publish, completed
         self._requests: queue.SimpleQueue[tuple[str | None, Request]] = queue.SimpleQueue()
-        self._events: list[tuple[str, Mapping[str, object]]] = []
+        self._events: deque[tuple[str, Mapping[str, object]]] = deque(maxlen=_EVENTS)
+        self._silent: set[str] = set()
+        self._sound = True
+        self._failures: dict[str, str] = {}
         self._stopping = False
         self.cycles = 0
         self.missed = 0
@@ -121,23 +131,20 @@ class Loop:
 
     def cycle(self, deadline_s: float) -> None:
         """Walk one sample of every loop; whatever fails, the heaters are off and it is said."""
+        self._sound = True
         try:
             self._walk(deadline_s)
         except Exception as error:  # noqa: BLE001 - the last line of defence ends in "heater off"
             self._all_off()
-            self.report(
-                "cycle.failed",
-                error=f"{type(error).__name__}: {error}",
-                trace=traceback.format_exc(),
-            )
-            for wiring in self.wirings:
-                wiring.regulator.fault("cycle.failed", 58, f"{type(error).__name__}: {error}")
-        else:
+            self._fail(self.wirings, "cycle.failed", error)
+            self._stand_in()
+        if self._sound:
             self.cycles += 1
-            self._completed()
+            self._failures.pop("cycle.failed", None)
+            self._harmless(self._completed)
 
     def shut_down(self) -> bool:
-        """Write power 0 to every board and let them go; return whether every board confirmed."""
+        """Write power 0 to every board and let them go; return whether no output can be on."""
         confirmed = self._all_off()
         for board in self.boards:
             board.close()
@@ -152,109 +159,183 @@ class Loop:
             self.report("cycle.late", late_s=late_s)
         self._grant_requests()
         samples = {id(board): self._read(board) for board in self.boards}
-        steps = []
+        walked = []
         for wiring in self.wirings:
-            raw = samples[id(wiring.sensor_board)].get(wiring.input)
-            measurement = wiring.sensor.measure(raw, self._clock.now_s())
+            measurement = self._measure(wiring, samples[id(wiring.sensor_board)])
             begin_ns = time.thread_time_ns()
             step = wiring.regulator.step(measurement)
-            steps.append((wiring, step, (time.thread_time_ns() - begin_ns) / 1000.0))
-        accepted = self._write({wiring.name: step for wiring, step, _ in steps})
-        events = self._take_events()
-        for wiring, step, tick_us in steps:
-            if events:
-                step = replace(step, events=(*step.events, *events))
-            truth = _truth(wiring.sensor_board)
-            self._hand_out(
-                Cycle(
-                    wiring.name, step, accepted[wiring.name], tick_us, late_s, self.missed, truth
-                )
-            )
+            walked.append((wiring, step, (time.thread_time_ns() - begin_ns) / 1000.0))
+        accepted = self._write({wiring.name: step for wiring, step, _ in walked})
+        events = self.take_events()
+        for wiring, step, tick_us in walked:
+            self._hand_out(wiring, step, events, accepted[wiring.name], tick_us, late_s)
 
     def _read(self, board: Connection) -> Mapping[str, RawSample]:
         try:
-            return board.read(self._clock.now_s() + EXCHANGE_S)
+            samples = board.read(self._clock.now_s() + EXCHANGE_S)
         except LinkError as error:
-            self._tell(board, "board.lost", 13, str(error))
+            if not board.awaited:
+                self._tell(board, "board.lost", 13, str(error))
+        except FaultError as error:
+            self._tell(board, "board.fault", 25, str(error))
         except DriverError as error:
-            self.report("board.silent", board=board.name, error=str(error))
+            if board.name not in self._silent:
+                self.report("board.silent", board=board.name, error=str(error))
+            self._silent.add(board.name)
+        except Exception as error:  # noqa: BLE001 - drivers come from entry points
+            self._fail(self._users(board), "cycle.failed", error)
+        else:
+            self._silent.discard(board.name)
+            return samples
         return {}
+
+    def _measure(self, wiring: Wiring, samples: Mapping[str, RawSample]) -> Measurement:
+        """Return what the input says; a sample that is not of these seconds is STALE."""
+        now_s = self._clock.now_s()
+        try:
+            measurement = wiring.sensor.measure(samples.get(wiring.input), now_s)
+            if -EXCHANGE_S <= now_s - measurement.t_s <= max(FRESH_S, 1.5 * self._period_s):
+                return measurement
+        except Exception as error:  # noqa: BLE001 - of a sample that a plug-in made
+            self._fail((wiring,), "cycle.failed", error)
+            return Measurement(now_s, quality=Quality.MISSING)
+        old = measurement.quality is Quality.GOOD
+        return replace(
+            measurement, t_s=now_s, quality=Quality.STALE if old else measurement.quality
+        )
 
     def _write(self, steps: Mapping[str, Step]) -> dict[str, float]:
         """Give every board its drives in one exchange; return the accepted power by loop."""
         accepted = dict.fromkeys(steps, math.nan)
-        now_s = self._clock.now_s()
         for board in self.boards:
             wired = [each for each in self.wirings if each.actuator_board is board]
             if not wired or board.board is None:
                 continue
-            drives = {w.output: w.law.drive_for(steps[w.name].command.power) for w in wired}
-            valid_until_s = min(steps[w.name].command.valid_until_s for w in wired)
+            now_s = self._clock.now_s()
+            drives = {w.output: self._drive(w, steps[w.name].command.power) for w in wired}
+            lasts_s = min(steps[w.name].command.valid_until_s - now_s for w in wired)
+            lasts_s = min(lasts_s, command_lasts_s(self._period_s))  # whatever a sample's time says
             try:
-                taken = board.write(drives, valid_until_s - now_s, now_s + EXCHANGE_S)
+                taken = board.write(drives, lasts_s, now_s + EXCHANGE_S)
+                powers = {w.name: _power(w.law, taken.get(w.output)) for w in wired}
             except DriverError as error:
                 lost = isinstance(error, LinkError)
                 code, fault = ("board.lost", 13) if lost else ("output.refused", 22)
                 self._tell(board, code, fault, str(error))
-                continue
-            for wiring in wired:
-                accepted[wiring.name] = wiring.law.power_from(taken.get(wiring.output, math.nan))
-                wiring.regulator.applied(accepted[wiring.name])
+            except Exception as error:  # noqa: BLE001 - drivers come from entry points
+                self._off(board)
+                self._fail(self._users(board), "cycle.failed", error)
+            else:
+                accepted |= powers
+                for wiring in wired:
+                    wiring.regulator.applied(powers[wiring.name])
         return accepted
+
+    def _drive(self, wiring: Wiring, power: float) -> float:
+        """Return the drive for `power`; a law that fails costs its own loop the heat, no other."""
+        try:
+            return wiring.law.drive_for(power)
+        except Exception as error:  # noqa: BLE001 - the other loops on this board go on
+            self._fail((wiring,), "cycle.failed", error)
+            return 0.0
+
+    def _hand_out(
+        self,
+        wiring: Wiring,
+        step: Step,
+        events: tuple[Event, ...],
+        accepted: float,
+        tick_us: float,
+        late_s: float,
+    ) -> None:
+        """Publish the finished cycle of one loop."""
+
+        def publish() -> None:
+            told = replace(step, events=(*step.events, *events)) if events else step
+            truth = _truth(wiring.sensor_board)
+            self._publish(Cycle(wiring.name, told, accepted, tick_us, late_s, self.missed, truth))
+
+        self._harmless(publish)
 
     # -- when something fails --------------------------------------------------------------------
 
+    def _users(self, board: Connection) -> tuple[Wiring, ...]:
+        """Return the loops that depend on `board`."""
+        return tuple(w for w in self.wirings if board in (w.sensor_board, w.actuator_board))
+
     def _tell(self, board: Connection, code: str, fault: int, text: str) -> None:
         """Send every loop that depends on `board` to SAFE."""
-        for wiring in self.wirings:
-            if board in (wiring.sensor_board, wiring.actuator_board):
-                wiring.regulator.fault(code, fault, text)
+        for wiring in self._users(board):
+            wiring.regulator.fault(code, fault, text)
+
+    def _fail(self, wirings: Iterable[Wiring], code: str, error: Exception) -> None:
+        """Send `wirings` to SAFE for an error that nobody foresaw, and say where it came from."""
+        text = f"{type(error).__name__}: {error}"
+        if self._failures.get(code) != text:  # not again every second
+            self._failures[code] = text
+            self.report(code, error=text, trace=traceback.format_exc())
+        for wiring in wirings:
+            wiring.regulator.fault(code, 58, text)
+            self._sound = False
 
     def _all_off(self) -> bool:
-        """Write power 0 to every output there is; return whether every board took it."""
+        """Write power 0 to every output there is; return whether no output can be on."""
         confirmed = True
-        for board in self.boards:
-            drives = {
-                w.output: w.law.drive_for(0.0) for w in self.wirings if w.actuator_board is board
-            }
-            if not drives or board.board is None:
-                continue
-            try:
-                taken = board.write(drives, EXCHANGE_S, self._clock.now_s() + EXCHANGE_S)
-                confirmed = confirmed and all(taken.get(output) == 0.0 for output in drives)
-            except DriverError:
-                confirmed = False  # said by the caller; the board's dead-man does the rest
+        for board in self.boards:  # every one, whatever the one before says
+            confirmed = self._off(board) and confirmed
         return confirmed
 
-    def _hand_out(self, cycle: Cycle) -> None:
-        """Publish `cycle`; a reader that fails is told of, and steers nothing."""
+    def _off(self, board: Connection) -> bool:
+        drives = {w.output: 0.0 for w in self.wirings if w.actuator_board is board}
+        if drives and board.board is not None:
+            try:
+                board.write(drives, EXCHANGE_S, self._clock.now_s() + EXCHANGE_S)
+            except DriverError:
+                return False  # said by the caller; the board's dead-man does the rest
+            except Exception as error:  # noqa: BLE001 - the next board must be written too
+                self._fail((), "cycle.failed", error)
+                return False
+        return not board.driven
+
+    def _stand_in(self) -> None:
+        """Publish a cycle without a reading for one that failed, so that it is seen and heard."""
+        events = self.take_events()
+        now_s = self._clock.now_s()
+        for wiring in self.wirings:
+            step = wiring.regulator.step(Measurement(now_s, quality=Quality.MISSING))
+            self._hand_out(wiring, step, events, math.nan, 0.0, 0.0)
+
+    def _harmless(self, reader: Callable[[], None]) -> None:
+        """Call `reader`; one that fails is told of, and steers nothing."""
         try:
-            self._publish(cycle)
+            reader()
         except Exception as error:  # noqa: BLE001 - readers may fail in any way
-            self.report(
-                "feed.failed",
-                error=f"{type(error).__name__}: {error}",
-                trace=traceback.format_exc(),
-            )
+            self._fail((), "feed.failed", error)
 
     # -- small things ----------------------------------------------------------------------------
 
     def _grant_requests(self) -> None:
-        while not self._requests.empty():
+        for _ in range(self._requests.qsize()):  # what comes meanwhile waits for the next cycle
             loop, request = self._requests.get_nowait()
-            for wiring in self.wirings:
-                if loop in (None, wiring.name):
-                    try:
-                        wiring.regulator.request(request)
-                    except Refused as refusal:
-                        self.report("request.refused", loop=wiring.name, why=str(refusal))
+            asked = [wiring for wiring in self.wirings if loop in (None, wiring.name)]
+            if not asked:
+                self.report("request.refused", loop=loop, why=f"there is no loop {loop!r}")
+            for wiring in asked:
+                try:
+                    wiring.regulator.request(request)
+                except Refused as refusal:
+                    self.report("request.refused", loop=wiring.name, why=str(refusal))
 
-    def _take_events(self) -> tuple[Event, ...]:
-        if not self._events:
-            return ()
-        taken, self._events = self._events, []
+    def take_events(self) -> tuple[Event, ...]:
+        """Return what was reported since the last cycle was published."""
         now_s = self._clock.now_s()
+        taken = [self._events.popleft() for _ in range(len(self._events))]
         return tuple(Event(now_s, name, fields) for name, fields in taken)
+
+
+def _power(law: ActuatorLaw, drive: float | None) -> float:
+    """Return the power of what the hardware took; NaN, and not 0, when it does not say."""
+    return law.power_from(drive) if is_finite_number(drive) else math.nan  # type: ignore[arg-type]
 
 
 def _truth(board: Connection) -> Mapping[str, float]:

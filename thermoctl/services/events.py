@@ -20,8 +20,11 @@ _BY_LEVEL: Final = {
         "trip.over_temperature",
         "trip.under_temperature",
         "latch.unreadable",
+        "loop.failed",
     ),
     "error": (
+        "board.failed",
+        "board.fault",
         "board.lost",
         "board.wrong",
         "config.refused",
