@@ -56,6 +56,8 @@ def covariance(name: str, value: float | npt.ArrayLike, n: int | None = None) ->
         `value` is not finite, symmetric and positive semi-definite, or not of shape (n, n).
     """
     matrix = numbers(name, value)
+    if matrix.ndim not in (0, 2) or matrix.size == 0:
+        raise ValueError(f"{name} must be a float or a square matrix, got shape {matrix.shape}")
     if matrix.ndim == 0 and n is not None:
         matrix = float(matrix) * np.eye(n)
     size = matrix.shape[0] if n is None and matrix.ndim else n
@@ -83,11 +85,17 @@ def positive(name: str, value: float, at_most: float = LARGEST) -> None:
 
 
 def numbers(name: str, value: npt.ArrayLike) -> Array:
-    """Return `value` as a new array of finite floats, or raise ``ValueError`` naming it."""
+    """Return `value` as a new array of finite floats, or raise ``ValueError`` naming it.
+
+    Text, truth values and complex numbers are no numbers here, though NumPy would convert them.
+    """
     try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        given = np.asarray(value)
+        array = None if given.dtype.kind in "bcSU" else np.array(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name} must consist of numbers, got {value!r}") from error
+    if array is None:
+        raise ValueError(f"{name} must consist of numbers, got {value!r}")
     if not np.isfinite(array).all():
         raise ValueError(f"{name} must be finite, got {value!r}")
     return array

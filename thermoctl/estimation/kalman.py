@@ -76,8 +76,9 @@ class CorrectedKalman(RecursiveLaw):
     def __post_init__(self) -> None:
         object.__setattr__(self, "R1", checked_drift(self.R1))
         positive("R2", self.R2)
-        limited = is_finite_number(self.inflation_max) and self.inflation_max >= 1.0
-        if not limited and self.inflation_max != math.inf:
+        limit = self.inflation_max
+        unlimited = isinstance(limit, float) and limit == math.inf
+        if not unlimited and not (is_finite_number(limit) and limit >= 1.0):
             raise ValueError(f"inflation_max must be at least 1, got {self.inflation_max!r}")
 
     def weigh(self, q: V, e: V, n: int, arithmetic: Arithmetic[V]) -> tuple[V, V | float]:

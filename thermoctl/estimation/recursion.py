@@ -23,7 +23,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from thermoctl.estimation.belief import LARGEST, covariance, frozen
+from thermoctl.estimation.belief import LARGEST, covariance, frozen, numbers
 from thermoctl.quantities import Array, is_finite_number
 from thermoctl.signals import Estimate
 
@@ -122,8 +122,9 @@ def checked_drift(value: float | Array) -> float | Array:
     """Return R1 as a float or a read-only matrix, or raise ``ValueError`` naming it."""
     if is_finite_number(value) and 0.0 <= value < LARGEST:
         return float(value)
-    if np.ndim(value) == 2:
-        return covariance("R1", value)
+    matrix = numbers("R1", value)
+    if matrix.ndim == 2:
+        return covariance("R1", matrix)
     raise ValueError(f"R1 must be a non-negative float or a covariance matrix, got {value!r}")
 
 

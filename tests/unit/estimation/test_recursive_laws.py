@@ -266,14 +266,27 @@ def test_a_drift_of_another_size_than_the_belief_is_named():
         *(
             ("R1", lambda law=law, v=v: law(R1=v))
             for law in (RandomWalkKalman, CorrectedKalman)
-            for v in (-1e-9, math.nan, math.inf, "x", np.ones(2), np.ones((2, 3)))
+            for v in (-1e-9, math.nan, math.inf, "x", np.ones(2), np.ones((2, 3)), np.ones((0, 0)))
+        ),
+        *(
+            (name, lambda build=build, v=v: build(v))
+            for name, build in (
+                ("R1", lambda v: CorrectedKalman(R1=v)),
+                ("P0", lambda v: start(2, v)),
+            )
+            for v in (
+                [[1.0, 2.0], [3.0]],
+                np.eye(2) > 0.0,
+                1j * np.eye(2),
+                [["1", "0"], ["0", "1"]],
+            )
         ),
         ("R1", lambda: CorrectedKalman(R1=[[1.0, 0.5], [0.0, 1.0]])),
         ("R1", lambda: CorrectedKalman(R1=np.diag([1.0, -0.1]))),
         ("R1", lambda: CorrectedKalman(R1=np.diag([1.0, math.nan]))),
         *(
             ("inflation_max", lambda v=v: CorrectedKalman(inflation_max=v))
-            for v in (0.9, math.nan, -math.inf, None)
+            for v in (0.9, math.nan, -math.inf, None, np.ones(2))
         ),
         *(("n", lambda v=v: start(v)) for v in (0, -1, 1.5, True)),
         *(
@@ -282,6 +295,8 @@ def test_a_drift_of_another_size_than_the_belief_is_named():
                 -1.0,
                 math.nan,
                 math.inf,
+                True,
+                "1.0",
                 np.eye(3),
                 np.ones(2),
                 [[1, 2], [2, 1]],
@@ -290,7 +305,7 @@ def test_a_drift_of_another_size_than_the_belief_is_named():
         ),
         *(
             ("theta0", lambda v=v: start(2, theta0=v))
-            for v in ([1.0], [1.0, math.nan], np.ones((2, 1)), "ab")
+            for v in ([1.0], [1.0, math.nan], np.ones((2, 1)), "ab", [True, False])
         ),
     ],
 )
