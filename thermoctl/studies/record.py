@@ -27,7 +27,13 @@ _JITTER_SHARE = 0.01
 
 TIME_NAMES = ("time_s", "time_utc", "t_s", "time", "timestamp", "datetime", "t")
 OUTPUT_NAMES = ("temperature_c",)
-INPUT_NAMES = ("accepted_power",)
+INPUT_NAMES = ("accepted_power", "power")
+
+LARGEST = 1e50
+"""No reading, power or time is beyond this; within it, sums of squares cannot overflow."""
+
+_NAMES_SHOWN = 12
+_NAME_SHOWN = 40
 
 
 class RecordError(ThermoctlError, ValueError):
@@ -108,7 +114,14 @@ class Collector:
         self.first_skipped = self.first_skipped or f"{where}: {why}"
 
     def add(self, where: str, t_s: float, u: float, y: float) -> None:
-        """Take a row of finite numbers, unless its time does not lie after the last one."""
+        """Take a row of finite numbers, unless its time does not lie after the last one.
+
+        A number beyond every meaning is a broken row, too.
+        """
+        wildest = max(t_s, u, y, key=abs)
+        if abs(wildest) > LARGEST:
+            self.skip(where, f"{wildest:g} is no number that could be meant")
+            return
         if self._t and not t_s > self._t[-1]:
             self.skip(where, f"time {t_s:g} s does not lie after {self._t[-1]:g} s")
             return
@@ -169,7 +182,7 @@ def choose_columns(
         If a column that was asked for, or an obvious one, is not there; it names those that are.
     """
     notes: list[str] = []
-    there = f"{source} has {', '.join(header)}" if header else f"{source} has none"
+    there = f"{source} has {_shown(header)}"
 
     def pick(role: str, name: str | None, obvious: Sequence[str]) -> str | None:
         if name is not None:
@@ -184,11 +197,18 @@ def choose_columns(
 
     output = pick("output", wanted.output, OUTPUT_NAMES)
     if output is None:
-        raise RecordError(f"expected the name of the output column; {there}")
+        raise RecordError(f"expected the name of the output column (--output); {there}")
     entry = pick("input", wanted.input, INPUT_NAMES)
     if entry is None:
-        raise RecordError(f"expected the name of the input column; {there}")
+        raise RecordError(f"expected the name of the input column (--input); {there}")
     time = pick("time", wanted.time, TIME_NAMES)
     if time is None:
         notes.append("no column is obviously the time: rows are taken as evenly spaced")
     return Columns(output, entry, time), notes
+
+
+def _shown(header: Sequence[str]) -> str:
+    """Return the first names of `header` for a terminal: short, and nothing that controls it."""
+    shown = [name if name.isprintable() else ascii(name) for name in header[:_NAMES_SHOWN]]
+    more = [f"and {len(header) - _NAMES_SHOWN} more"] if len(header) > _NAMES_SHOWN else []
+    return ", ".join([*(name[:_NAME_SHOWN] for name in shown), *more]) or "none"

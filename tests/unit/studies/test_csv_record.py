@@ -32,7 +32,10 @@ def test_sound_rows_are_read_as_they_stand(write):
 
 @pytest.mark.parametrize(
     "bad",
-    ["5,1,nan", "5,1,inf", "5,,21", "5,1", "x,1,21", "5,1,--", "4,1,21", "-7,1,21", "5,1,2\0"],
+    [
+        *("5,1,nan", "5,1,inf", "5,,21", "5,1", "x,1,21", "5,1,--", "4,1,21", "-7,1,21", "5,1,2\0"),
+        *("5,1,1e300", "5,-1e300,21", "1e300,1,21"),
+    ],
 )
 def test_a_row_that_is_not_sound_is_left_out_and_named_with_its_line(write, bad):
     record = read_csv(write("t,u,y\n" + rows(5) + bad + "\n" + rows(5, start=6)), NAMED)
@@ -68,6 +71,22 @@ def test_an_obvious_time_column_is_taken_and_said(write):
     record = read_csv(write("time_s,u,y\n0,1,20\n2,1,21\n4,1,22\n"), Columns("y", "u"))
     assert record.period_s == 2.0
     assert "time taken from column 'time_s'" in record.notes
+
+
+@pytest.mark.parametrize("header", ["temperature_c,power", "power,temperature_c,accepted_power"])
+def test_the_columns_this_program_writes_itself_need_not_be_named(write, header):
+    row = ",".join(["0.5"] * header.count(",")) + ",0.5\n"
+    record = read_csv(write(f"{header}\n{row}{row}"), Columns())
+    assert record.names.output == "temperature_c"
+    assert record.names.input == header.split(",")[-1]
+
+
+def test_a_header_is_told_short_and_without_what_would_steer_a_terminal(write):
+    header = ",".join(["\x1b[2J", "x" * 500, *(f"c{k}" for k in range(5000))])
+    with pytest.raises(RecordError, match=r"x1b.*, c0, .* and 4990 more$") as told:
+        read_csv(write(header + "\n"), Columns())
+    assert str(told.value).isprintable()
+    assert len(str(told.value)) < 300
 
 
 def test_uneven_sampling_is_noticed_and_even_sampling_is_not(write):
