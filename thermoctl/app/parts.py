@@ -94,7 +94,13 @@ def _identifier(
 ) -> Identifier:
     law = plugins.build(plugins.find(plugins.ESTIMATORS, table.kind), table.options)
     theta0 = table.theta0 or _first_guess(structure, gain_k)
-    return Identifier(structure, _guarded(law, table, structure, setpoint_c), theta0, table.P0)
+    guarded = _guarded(law, table, structure, setpoint_c)
+    P0 = table.P0
+    if isinstance(guarded, Guarded) and guarded.covariance_max is not None:
+        # The cap holds from the first sample on. Else that one sample, with all its noise, would
+        # decide the pole, and the cap would then keep it there for half an hour.
+        P0 = min(P0, guarded.covariance_max)
+    return Identifier(structure, guarded, theta0, P0)
 
 
 def _first_guess(structure: Arx | KnownGain, gain_k: float) -> tuple[float, ...]:

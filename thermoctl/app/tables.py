@@ -102,7 +102,9 @@ class EstimatorTable(Options):
     """Table ``[loops.NAME.estimator]``: the law that learns the model."""
 
     kind: str = Field("ckf", description="ckf, nkf, rls, vff, or one from a plug-in.")
-    P0: Positive = Field(1.0, description="Variance of the parameters at the start.")
+    P0: Positive = Field(
+        1.0, description="Variance of the parameters at the start; at most the guards' cap."
+    )
     theta0: tuple[Finite, ...] | None = Field(
         None,
         description="Parameters at the start; if absent no loss and the model's gain.",

@@ -82,6 +82,24 @@ def test_a_loop_that_learns_everything_heats_from_its_first_sample_on(minimal, g
         assert step.alarms == ()
 
 
+def test_the_noise_of_the_first_sample_does_not_keep_a_cold_tank_cold(minimal):
+    tank = minimal["loops"]["tank"]
+    tank["model"] = {"gain_k_per_s": 0.024}
+    tank["period_s"], tank["mode"] = 0.5, "auto"
+    regulator = regulator_for(load(minimal))
+    for k in range(20):
+        step = regulator.step(Measurement(0.5 * k, 20.9 if k == 1 else 20.0))
+        assert step.command.power == 1.0
+
+
+def test_bare_laws_start_from_the_covariance_that_is_given(minimal):
+    tank = minimal["loops"]["tank"]
+    tank["estimator"] = {"P0": 4.0, "guards": {"enabled": False}}
+    assert plan_for(load(minimal).loops["tank"]).identifier.P0 == 4.0
+    tank["estimator"] = {"P0": 4.0, "guards": {"covariance_max": 0.5}}
+    assert plan_for(load(minimal).loops["tank"]).identifier.P0 == 0.5
+
+
 def test_a_learnt_gain_is_bounded_from_below_unless_the_guards_are_off(minimal):
     tank = minimal["loops"]["tank"]
     tank["model"] = {"structure": "arx", "gain_k_per_s": 0.1}
