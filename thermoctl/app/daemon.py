@@ -160,9 +160,11 @@ class Daemon:
                 self._attend(control)
             finally:  # whatever ends this thread, the other one ends with power 0
                 self._stop()
+                self._notifier.stopping()
                 control.join(_STOP_S)
                 self._say_the_rest()
                 self._emit("loop.stopped", None, power_0_confirmed=self._confirmed)
+            self._store_runs()
         return self._confirmed and not self._failed
 
     def _control(self) -> None:
@@ -194,9 +196,6 @@ class Daemon:
                 self._reloading = False
                 self._reload()
             self._store_runs()
-        self._notifier.stopping()
-        control.join(_STOP_S)
-        self._store_runs()
 
     def _note_signal(self, number: int, frame: object) -> None:
         """Only set flags: this runs in the middle of whatever the main thread is doing.

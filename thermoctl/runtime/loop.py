@@ -13,6 +13,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 from thermoctl.errors import DriverError, FaultError, LinkError, Refused
 from thermoctl.model.actuator import ActuatorLaw
@@ -85,7 +86,7 @@ class Loop:
         self._events: deque[tuple[str, Mapping[str, object]]] = deque(maxlen=_EVENTS)
         self._silent: set[str] = set()
         self._sound = True
-        self._failures: dict[str, str] = {}
+        self._failure = ""
         self._stopping = False
         self.cycles = 0
         self.missed = 0
@@ -140,7 +141,7 @@ class Loop:
             self._stand_in()
         if self._sound:
             self.cycles += 1
-            self._failures.pop("cycle.failed", None)
+            self._failure = ""
             self._harmless(self._completed)
 
     def shut_down(self) -> bool:
@@ -271,8 +272,8 @@ class Loop:
     def _fail(self, wirings: Iterable[Wiring], code: str, error: Exception) -> None:
         """Send `wirings` to SAFE for an error that nobody foresaw, and say where it came from."""
         text = f"{type(error).__name__}: {error}"
-        if self._failures.get(code) != text:  # not again every second
-            self._failures[code] = text
+        if text != self._failure or code != "cycle.failed":  # not the same again every second
+            self._failure = text
             self.report(code, error=text, trace=traceback.format_exc())
         for wiring in wirings:
             wiring.regulator.fault(code, 58, text)
@@ -300,15 +301,18 @@ class Loop:
     def _stand_in(self) -> None:
         """Publish a cycle without a reading for one that failed, so that it is seen and heard."""
         events = self.take_events()
-        now_s = self._clock.now_s()
-        for wiring in self.wirings:
-            step = wiring.regulator.step(Measurement(now_s, quality=Quality.MISSING))
-            self._hand_out(wiring, step, events, math.nan, 0.0, 0.0)
+        unread = Measurement(self._clock.now_s(), quality=Quality.MISSING)
 
-    def _harmless(self, reader: Callable[[], None]) -> None:
-        """Call `reader`; one that fails is told of, and steers nothing."""
+        def publish(wiring: Wiring) -> None:
+            self._hand_out(wiring, wiring.regulator.step(unread), events, math.nan, 0.0, 0.0)
+
+        for wiring in self.wirings:
+            self._harmless(partial(publish, wiring))
+
+    def _harmless(self, call: Callable[[], None]) -> None:
+        """Make a call that must steer nothing; one that fails is told of, and that is all."""
         try:
-            reader()
+            call()
         except Exception as error:  # noqa: BLE001 - readers may fail in any way
             self._fail((), "feed.failed", error)
 

@@ -1,0 +1,217 @@
+"""How the daemon ends: signals at awkward moments, threads that die; and reloads of anything."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.e2e
+
+ROOT = Path(__file__).parents[2]
+AQUARIUM = (ROOT / "config" / "aquarium.toml").read_text()
+PATIENCE_S = 15.0
+
+WATCHED = """
+import atexit, sys
+from pathlib import Path
+from thermoctl.app import daemon
+from thermoctl_drivers.simulated import SimulatedBoard as Board
+
+powers = []
+write, close = Board.write, Board.close
+def watched_write(self, outputs, *rest):
+    taken = write(self, outputs, *rest)
+    powers.append(taken["heater"])
+    return taken
+Board.write = watched_write
+atexit.register(lambda: print("POWERS", powers[0] > 0.0, powers[-1], flush=True))
+BREAK
+try:
+    ended = daemon.Daemon([Path(sys.argv[1])], Path(sys.argv[2])).run()
+finally:
+    print("HEATED", any(powers), flush=True)
+print("RAN", ended, flush=True)
+sys.exit(0 if ended else 1)
+"""
+
+
+class Process:
+    """A daemon with folders of its own; `breaks` is Python that is run before it starts."""
+
+    def __init__(self, folder, breaks=None, config=AQUARIUM):
+        self.config, self.log = folder / "own.toml", folder / "log"
+        self.config.write_text(config)
+        run = folder / "run"
+        run.mkdir(mode=0o700)
+        environ = {**os.environ, "XDG_RUNTIME_DIR": str(run), "PYTHONUNBUFFERED": "1"}
+        environ.pop("NOTIFY_SOCKET", None)
+        state = str(folder / "state")
+        if breaks is None:
+            words = ["-m", "thermoctl", "run", "-c", str(self.config), "--state", state]
+        else:
+            words = ["-c", WATCHED.replace("BREAK", breaks), str(self.config), state]
+        with self.log.open("a") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, *words], env=environ, stderr=log, stdout=log, cwd=folder
+            )
+
+    def events(self):
+        lines = self.log.read_text().splitlines()
+        return [json.loads(line) for line in lines if line.startswith("{")]
+
+    def named(self, name):
+        return [event for event in self.events() if event["event"] == name]
+
+    def wait_for(self, name, count=1):
+        until_s = time.monotonic() + PATIENCE_S
+        while len(self.named(name)) < count:
+            if time.monotonic() > until_s:
+                pytest.fail(f"no {name} within {PATIENCE_S} s:\n{self.log.read_text()}")
+            time.sleep(0.02)
+
+    def end(self, *signals):
+        """Send `signals`; return the exit code and how long the end took."""
+        began_s = time.monotonic()
+        for number in signals:
+            self.process.send_signal(number)
+        code = self.process.wait(PATIENCE_S)
+        return code, time.monotonic() - began_s
+
+
+@pytest.fixture
+def start(tmp_path):
+    started = []
+
+    def begin(*arguments, **named):
+        started.append(Process(tmp_path, *arguments, **named))
+        return started[-1]
+
+    yield begin
+    for each in started:
+        if each.process.poll() is None:
+            each.process.kill()
+        each.process.wait(PATIENCE_S)
+
+
+BROKEN_READ = """
+read = Board.read
+def broken(self, deadline_s):
+    if len(powers) >= 3:
+        raise ERROR
+    return read(self, deadline_s)
+Board.read = broken
+"""
+
+
+@pytest.mark.parametrize("error", ["SystemExit(0)", "KeyboardInterrupt()", "GeneratorExit()"])
+def test_a_control_thread_that_is_ended_leaves_power_0_says_so_and_is_no_success(start, error):
+    daemon = start(BROKEN_READ.replace("ERROR", error))
+    daemon.wait_for("loop.started")
+    began_s = time.monotonic()
+    code = daemon.process.wait(PATIENCE_S)
+    print(f"{error} in the control thread: ended after {time.monotonic() - began_s:.2f} s")
+    assert code == 1
+    assert error.partition("(")[0] in daemon.named("loop.failed")[0]["error"]
+    text = daemon.log.read_text()
+    assert "HEATED True" in text
+    assert "POWERS True 0.0" in text
+    assert daemon.named("loop.stopped")[0]["power_0_confirmed"] is True
+
+
+BROKEN_MAIN = """
+store = daemon.Daemon._store_runs
+def broken(self):
+    if len(powers) >= 3:
+        raise RuntimeError("the main thread has a bug")
+    store(self)
+daemon.Daemon._store_runs = broken
+"""
+
+
+def test_a_main_thread_that_dies_takes_the_heat_with_it(start):
+    daemon = start(BROKEN_MAIN)
+    assert daemon.process.wait(PATIENCE_S) == 1
+    text = daemon.log.read_text()
+    assert "the main thread has a bug" in text
+    assert "POWERS True 0.0" in text
+    assert daemon.named("loop.stopped")[0]["power_0_confirmed"] is True
+
+
+def test_a_signal_in_the_middle_of_a_reload_ends_it_with_power_0(start):
+    daemon = start("pass")
+    daemon.wait_for("board.opened")
+    code, took_s = daemon.end(signal.SIGHUP, signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
+    print(f"HUP TERM HUP INT: ended after {took_s:.2f} s")
+    assert (code, took_s < 2.0) == (0, True)
+    assert " 0.0\n" in daemon.log.read_text()  # the last power that was written
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=["TERM", "INT"])
+def test_a_signal_while_it_starts_ends_it_with_nothing_switched_on(start, number):
+    daemon = start()
+    daemon.wait_for("loop.started")  # the control thread begins about now
+    code, took_s = daemon.end(number, number)
+    print(f"{number!r} at the start: ended after {took_s:.2f} s")
+    assert (code, took_s < 2.0) == (0, True)
+    assert daemon.named("loop.stopped")[0]["power_0_confirmed"] is True
+
+
+def test_a_signal_while_a_board_hangs_in_opening_ends_it_within_two_seconds(start):
+    leader, follower = os.openpty()  # somebody holds the line and never answers
+    try:
+        text = (ROOT / "config" / "thermodaq.toml").read_text()
+        config = re.sub(r'port = "[^"]*"', f'port = "{os.ttyname(follower)}"', text)
+        daemon = start(config=config)
+        daemon.wait_for("loop.started")
+        time.sleep(0.5)
+        code, took_s = daemon.end(signal.SIGTERM)
+    finally:
+        os.close(leader)
+        os.close(follower)
+    print(f"TERM while a board hangs in opening: ended after {took_s:.2f} s")
+    assert (code, took_s < 2.0) == (0, True)
+    assert "Traceback" not in daemon.log.read_text()
+
+
+HUNG_READ = BROKEN_READ.replace("raise ERROR", "__import__('time').sleep(60)")
+
+
+def test_a_driver_that_hangs_for_ever_cannot_keep_the_process_and_is_no_success(start):
+    daemon = start(HUNG_READ)
+    daemon.wait_for("board.opened")
+    time.sleep(3.5)
+    code, took_s = daemon.end(signal.SIGTERM)
+    print(f"TERM while a driver hangs: ended after {took_s:.2f} s")
+    assert (code, took_s < 2.5) == (1, True)
+    assert daemon.named("loop.stopped")[0]["power_0_confirmed"] is False
+
+
+def test_a_reload_of_anything_at_all_leaves_the_old_configuration_in_force(start):
+    daemon = start()
+    daemon.wait_for("board.opened")
+    bad = [
+        b"\xff\xfe\x00nonsense",
+        b"a = " + b"[" * 20_000,
+        *(AQUARIUM.replace("setpoint_c = 37.5", f"setpoint_c = {text}").encode()
+          for text in ("nan", "1e400", '"warm"', "90.0")),
+        AQUARIUM.replace("[loops.tank", '[loops."tank.two"').encode(),
+        None,
+    ]  # fmt: skip
+    for count, content in enumerate(bad, start=1):
+        daemon.config.unlink()
+        if content is not None:
+            daemon.config.write_bytes(content)
+        daemon.process.send_signal(signal.SIGHUP)
+        daemon.wait_for("config.refused", count)
+    daemon.config.write_text(AQUARIUM.replace("setpoint_c = 37.5", "setpoint_c = 38.5"))
+    daemon.process.send_signal(signal.SIGHUP)
+    daemon.wait_for("setpoint.changed")
+    (changed,) = daemon.named("setpoint.changed")
+    assert (changed["before_c"], changed["after_c"]) == (37.5, 38.5)
+    assert daemon.end(signal.SIGTERM)[0] == 0
