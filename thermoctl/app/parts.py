@@ -38,11 +38,10 @@ def plan_for(table: LoopTable) -> Plan:
     """
     with _within("model", table.model):
         structure = _structure(table.model, table.period_s)
-    with _within("estimator", table.estimator):
-        gain_k = table.model.gain_k_per_s * table.period_s
-        identifier = _identifier(table.estimator, structure, table.setpoint_c, gain_k)
     with _within("controller", table.controller):
-        controller = _controller(table, structure, gain_k)
+        controller = _controller(table, structure)
+    with _within("estimator", table.estimator):
+        identifier = _identifier(table, structure, getattr(controller, "reference_time_s", 0.0))
     with _within("", table):
         return Plan(_limits(table), identifier, controller, table.setpoint_c, table.mode)
 
@@ -89,18 +88,24 @@ def _structure(table: ModelTable, period_s: float) -> Arx | KnownGain:
     return Arx(table.n, table.m, y_centre_c=table.centre_c, y_scale_k=table.scale_k)
 
 
-def _identifier(
-    table: EstimatorTable, structure: Arx | KnownGain, setpoint_c: float, gain_k: float
-) -> Identifier:
+def _identifier(loop: LoopTable, structure: Arx | KnownGain, reference_time_s: float) -> Identifier:
+    table = loop.estimator
     law = plugins.build(plugins.find(plugins.ESTIMATORS, table.kind), table.options)
-    theta0 = table.theta0 or _first_guess(structure, gain_k)
-    guarded = _guarded(law, table, structure, setpoint_c)
-    P0 = table.P0
-    if isinstance(guarded, Guarded) and guarded.covariance_max is not None:
-        # The cap holds from the first sample on. Else that one sample, with all its noise, would
-        # decide the pole, and the cap would then keep it there for half an hour.
-        P0 = min(P0, guarded.covariance_max)
-    return Identifier(structure, guarded, theta0, P0)
+    theta0 = table.theta0 or _first_guess(structure, _gain_k(loop))
+    if not table.guards.enabled:
+        return Identifier(structure, law, theta0, table.P0)
+    # The cap holds from the first sample on. Else that one sample, with all its noise, would
+    # decide the pole, and the cap would then keep it there for half an hour.
+    cap = table.guards.covariance_max
+    if cap is None:
+        share = loop.period_s / reference_time_s if reference_time_s > 0.0 else math.inf
+        cap = _covariance_max(table.P0, law, structure, loop.setpoint_c, share)
+    return Identifier(structure, _guarded(law, table, structure, cap), theta0, min(table.P0, cap))
+
+
+def _gain_k(loop: LoopTable) -> float:
+    """Return the rise during one period at full power, in K, as it is configured."""
+    return loop.model.gain_k_per_s * loop.period_s
 
 
 def _first_guess(structure: Arx | KnownGain, gain_k: float) -> tuple[float, ...]:
@@ -116,11 +121,9 @@ def _first_guess(structure: Arx | KnownGain, gain_k: float) -> tuple[float, ...]
 
 
 def _guarded(
-    law: Estimator, table: EstimatorTable, structure: Arx | KnownGain, setpoint_c: float
+    law: Estimator, table: EstimatorTable, structure: Arx | KnownGain, covariance_max: float
 ) -> Estimator:
     guards = table.guards
-    if not guards.enabled:
-        return law
     excitation_min = guards.excitation_min
     if excitation_min is None and isinstance(structure, Arx):
         excitation_min = _ARX_EXCITATION_MIN
@@ -128,30 +131,35 @@ def _guarded(
     too_simple = isinstance(structure, KnownGain)  # its innovations are lag as much as noise
     return Guarded(
         law,  # type: ignore[arg-type]
-        covariance_max=guards.covariance_max or _covariance_max(table, structure, setpoint_c),
+        covariance_max=covariance_max,
         excitation_min=excitation_min,
         robust_R2=guards.robust_R2 and kalman,
         R2_min=getattr(law, "R2", None) if too_simple else None,
     )
 
 
-def _covariance_max(table: EstimatorTable, structure: Arx | KnownGain, setpoint_c: float) -> float:
+def _covariance_max(
+    P0: float, law: Estimator, structure: Arx | KnownGain, setpoint_c: float, share: float
+) -> float:
     """Return the cap on P when none is set: P0, or for a known gain what physics allows.
 
     A loss, (1 - a) times the temperature, that is less certain than the heater's full power would
-    make no sense; a noisy converter would otherwise keep the pole jumping.
+    make no sense; a noisy converter would otherwise keep the pole jumping. Nor may one sample
+    teach more than its `share` of the reference time, a period over three lags: while the heat is
+    still under way it looks lost, and a small vessel would be given as much again.
     """
     if isinstance(structure, Arx):
-        return table.P0
-    return min(table.P0, (structure.b_k / max(abs(setpoint_c), 1.0)) ** 2)
+        return P0
+    most_k2 = min(structure.b_k**2, getattr(law, "R2", 1.0) * share)
+    return min(P0, most_k2 / max(abs(setpoint_c), 1.0) ** 2)
 
 
-def _controller(table: LoopTable, structure: Arx | KnownGain, gain_k: float) -> Controller:
+def _controller(table: LoopTable, structure: Arx | KnownGain) -> Controller:
     law = plugins.find(plugins.CONTROLLERS, table.controller.kind)
     known, options = plugins.option_names(law), dict(table.controller.options)
     injected: dict[str, Any] = {"structure": structure} if "structure" in known else {}
     if isinstance(structure, Arx) and table.estimator.guards.enabled and "gain_min_k" in known:
-        options.setdefault("gain_min_k", _ARX_GAIN_SHARE * gain_k)
+        options.setdefault("gain_min_k", _ARX_GAIN_SHARE * _gain_k(table))
     controller: Controller = plugins.build(law, options, **injected)
     return controller
 

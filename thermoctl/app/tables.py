@@ -84,7 +84,8 @@ class GuardsTable(Table):
     covariance_max: Positive | None = Field(
         None,
         description="Cap on the diagonal of P; when absent P0 for structure arx, and for "
-        "known-gain the square of gain over set point.",
+        "known-gain the square of gain over set point, at most R2 times period over reference time "
+        "over the square of the set point.",
     )
     excitation_min: Positive | None = Field(
         None,

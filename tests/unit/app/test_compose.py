@@ -92,6 +92,21 @@ def test_the_noise_of_the_first_sample_does_not_keep_a_cold_tank_cold(minimal):
         assert step.command.power == 1.0
 
 
+@pytest.mark.parametrize(("period_s", "gain_k_per_s"), [(1.0, 0.0449), (5.0, 0.7)])
+def test_heat_that_is_under_way_for_a_lag_is_not_taken_for_lost(minimal, period_s, gain_k_per_s):
+    tank = minimal["loops"]["tank"]
+    tank["model"] = {"gain_k_per_s": gain_k_per_s}
+    tank["controller"] = {"kind": "self-tuning-mv", "reference_time_s": 60.0}
+    tank["estimator"] = {"R2": 0.1}
+    tank["period_s"], tank["mode"] = period_s, "auto"
+    regulator = regulator_for(load(minimal))
+    for k in range(1 + int(20.0 / period_s)):  # a third of the reference time
+        step = regulator.step(Measurement(k * period_s, 30.0))
+        regulator.applied(step.command.power)
+    loss_k = (1.0 - step.estimate.theta[0]) * 30.0
+    assert 0.0 < loss_k < 0.25 * gain_k_per_s * period_s
+
+
 def test_bare_laws_start_from_the_covariance_that_is_given(minimal):
     tank = minimal["loops"]["tank"]
     tank["estimator"] = {"P0": 4.0, "guards": {"enabled": False}}
