@@ -152,7 +152,11 @@ class LoopTable(Table):
         1.0, description="Most power ever given, as a fraction."
     )
     rise_per_s: Positive | None = Field(None, description="Most the power may rise in a second.")
-    jump_k: Positive = Field(1.0, description="A reading farther off than this may be an outlier.")
+    jump_k: Positive = Field(
+        1.0,
+        description="A reading farther off than this may be an outlier; left out, it is at least "
+        "twice the rise in a period at full power.",
+    )
     sensor: SensorTable | None = None
     actuator: ActuatorTable | None = None
     controller: Options = Field(

@@ -12,7 +12,7 @@ from thermoctl.app.settings import load
 from thermoctl.errors import ConfigError
 from thermoctl.model.arx import Arx, KnownGain
 from thermoctl.runtime.clock import SimulatedClock
-from thermoctl.signals import Measurement, Mode, RawSample, SetPoint
+from thermoctl.signals import Measurement, Mode, RawSample, SetPoint, State
 
 
 def changed(text: str, path: str, **values: object) -> dict:
@@ -105,6 +105,18 @@ def test_heat_that_is_under_way_for_a_lag_is_not_taken_for_lost(minimal, period_
         regulator.applied(step.command.power)
     loss_k = (1.0 - step.estimate.theta[0]) * 30.0
     assert 0.0 < loss_k < 0.25 * gain_k_per_s * period_s
+
+
+def test_a_fast_tank_at_full_power_is_no_outlier(minimal):
+    tank = minimal["loops"]["tank"]
+    tank["model"], tank["period_s"], tank["mode"] = {"gain_k_per_s": 0.72}, 5.0, "auto"
+    regulator = regulator_for(load(minimal))
+    for k in range(8):
+        step = regulator.step(Measurement(5.0 * k, 5.0 + 3.6 * k))
+        assert step.state is State.RUN
+    assert plan_for(load(minimal).loops["tank"]).limits.jump_k == pytest.approx(7.2)
+    tank["jump_k"] = 0.5
+    assert plan_for(load(minimal).loops["tank"]).limits.jump_k == 0.5
 
 
 def test_bare_laws_start_from_the_covariance_that_is_given(minimal):
