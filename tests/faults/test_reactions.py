@@ -9,12 +9,16 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
 
 from thermoctl.app.compose import loop_for, regulator_for
+from thermoctl.app.live.desk import Desk
+from thermoctl.app.live.keys import Action
+from thermoctl.app.live.model import Facts
 from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
 from thermoctl.app.simulate import wired
@@ -26,7 +30,7 @@ from thermoctl.plant.parameters import TankParameters
 from thermoctl.regulator import Regulator
 from thermoctl.runtime.connection import Connection
 from thermoctl.runtime.loop import EXCHANGE_S, Loop, Wiring
-from thermoctl.signals import Beliefs, Cycle, Estimate, Quality, RawSample, SetPoint, State
+from thermoctl.signals import Beliefs, Cycle, Estimate, Mode, Quality, RawSample, SetPoint, State
 from thermoctl.testing import FaultyLink, LockStepLink, ManualClock, ScriptedBoard
 from thermoctl_drivers import thermodaq_frames as frames
 from thermoctl_drivers.thermodaq import ThermoDaq, ThermoDaqSettings
@@ -518,6 +522,19 @@ def test_a_bad_set_point_put_into_the_queue_is_refused_and_the_old_one_stays(val
     assert tank.last.step.setpoint_c == 37.5
     with pytest.raises(Refused, match="5 to 55"):
         tank.loop.wirings[0].regulator.request(SetPoint(value))
+
+
+@pytest.mark.parametrize("setpoint_c", [math.nan, math.inf, -math.inf, 1e308, 5.0, 55.0])
+def test_no_key_of_the_live_view_asks_for_a_set_point_out_of_range(setpoint_c: float) -> None:
+    desk = Desk(Facts("tank", 1.0, 5.0, 55.0, datetime.now(UTC)))
+    tank = Tank(settled_s=2)
+    steps = [each for each in Action if each.name.startswith("SETPOINT")]
+    assert len(steps) == 4
+    for action in steps * 20:
+        request = desk.press(action, Mode.AUTO, setpoint_c)
+        assert isinstance(request, SetPoint)
+        assert 5.0 <= request.value_c <= 55.0
+        tank.loop.wirings[0].regulator.request(request)
 
 
 def test_a_request_for_a_loop_that_is_not_there_is_answered() -> None:

@@ -159,3 +159,30 @@ def test_step_never_raises_and_never_leaves_0_to_1(samples):
         step = subject.step(Measurement(t_s, temperature_c, quality))
         assert 0.0 <= step.command.power <= 1.0
         subject.applied(applied)
+
+
+def test_a_fault_from_outside_is_over_after_half_a_minute_of_good_readings():
+    subject = regulator(Always(0.5))
+    see(subject, 0)
+    subject.fault("output.refused", 22, "expected 0.5, got NAK")
+    steps = [see(subject, t) for t in range(1, 40)]
+    on = [step.command.power > 0.0 for step in steps].index(True)
+    assert on == 30
+    assert [alarm.active for alarm in steps[on - 1].alarms] == [True]
+    assert [alarm.active for alarm in steps[on].alarms] == [False]
+
+
+def test_an_output_that_takes_too_much_only_once_is_no_fault():
+    subject = regulator(Always(0.2))
+    for t in range(20):
+        step = see(subject, t)
+        subject.applied(0.9 if t % 2 else 0.2)
+    assert step.state is State.RUN
+
+
+def test_what_the_output_took_is_what_the_model_learns_from():
+    told, untold = regulator(Always(0.8)), regulator(Always(0.8))
+    for t in range(30):
+        steps = see(told, t, 30.0 + 0.01 * t), see(untold, t, 30.0 + 0.01 * t)
+        told.applied(0.1)
+    assert steps[0].estimate.theta.item() > steps[1].estimate.theta.item()

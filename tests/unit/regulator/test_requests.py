@@ -79,3 +79,8 @@ def test_every_change_is_an_event(warm):
     warm.regulator.request(Mode.MANUAL)
     names = [event.name for event in warm.step().events]
     assert names == ["setpoint.changed", "mode.changed"]
+
+
+def test_a_loop_that_starts_in_manual_starts_at_power_0(drive_with):
+    drive = drive_with(water_c=20.0, mode="manual")
+    assert drive.run(10).command.power == 0.0

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from thermoctl.signals import Acknowledge, Measurement, Mode, Quality, State
+from thermoctl.regulator import Regulator
+from thermoctl.signals import Acknowledge, Alarm, Measurement, Mode, Quality, State
 
 
 @pytest.mark.parametrize("quality", [Quality.OPEN, Quality.SHORT])
@@ -157,3 +158,41 @@ def test_manual_power_ends_too_when_the_sensor_is_lost(warm):
     warm.regulator.request(Mode.MANUAL)
     assert warm.run(10).command.power > 0.0
     assert warm.seconds_to_power_0(Quality.MISSING) <= 3
+
+
+@pytest.mark.parametrize("quality", [Quality.OPEN, Quality.SHORT, Quality.MISSING])
+def test_a_fault_that_lasts_is_told_once(warm, quality):
+    warm.run(100, quality)
+    told = [event.name for step in warm.steps for event in step.events]
+    assert told.count(f"sensor.{quality}") == 1
+    assert [alarm.active for alarm in warm.steps[-1].alarms] == [True]
+
+
+def test_an_alarm_that_is_over_stays_listed_until_it_is_acknowledged(warm):
+    warm.run(3, Quality.SHORT)
+    assert [(alarm.code, alarm.active) for alarm in warm.run(60).alarms] == [
+        ("sensor.short", False)
+    ]
+    warm.regulator.request(Acknowledge())
+    assert warm.step().alarms == ()
+
+
+def test_an_alarm_that_is_acknowledged_leaves_when_it_is_over(warm):
+    warm.run(3, Quality.SHORT)
+    warm.regulator.request(Acknowledge("sensor.short"))
+    (alarm,) = warm.step(Quality.SHORT).alarms
+    assert (alarm.active, alarm.acknowledged) == (True, True)
+    assert warm.run(60).alarms == ()
+
+
+def test_a_latch_of_an_earlier_run_keeps_the_heater_off_from_the_first_step(drive_with):
+    whole = drive_with(water_c=20.0).regulator._plan
+    alarm = Alarm("trip.over_temperature", 9, 1, 0.0, "too hot", latched=True)
+    drive = drive_with(water_c=20.0)
+    drive.regulator = Regulator(whole, alarm)
+    assert (drive.step().state, drive.power) == (State.LATCHED, 0.0)
+    assert drive.run(100).command.reason == "trip.over_temperature"
+    assert "before this start" in drive.steps[-1].alarms[0].text
+    drive.regulator.request(Acknowledge())
+    assert drive.run(29).state is State.SAFE
+    assert drive.run(5).command.power > 0.0
