@@ -1,4 +1,4 @@
-"""The register of alarms: what is wrong now, and what was and nobody has acknowledged."""
+"""What is wrong now, and what was and nobody has acknowledged."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class AlarmRegister:
         return True
 
     def clear(self, code: str) -> bool:
-        """The cause of `code` is gone; return whether it was active. A latched row stays active."""
+        """Say that `code` is over; return whether it was active. A latched row stays."""
         row = self._rows.get(code)
         if row is None or not row.active or row.latched:
             return False
@@ -43,7 +43,7 @@ class AlarmRegister:
         return True
 
     def acknowledge(self, code: str | None) -> tuple[str, ...]:
-        """Acknowledge `code`, or all; a latch is released with it. Return the codes it met."""
+        """Acknowledge `code`, or all, latches too; return the codes it met."""
         met = [row for row in self._rows.values() if code in (None, row.code)]
         for row in met:
             if row.latched or not row.active:

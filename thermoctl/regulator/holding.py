@@ -1,4 +1,4 @@
-"""The power that has been holding the set point, whatever the controller and its model."""
+"""The power that has been holding the set point, whatever asked for it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Holding:
     held_s: float = 0.0
 
     def after(self, deviation_k: float, applied: float, interval_s: float) -> Holding:
-        """Return the mean after `applied` was given for `interval_s`; NaN deviation: no sample."""
+        """Return the mean after `applied` for `interval_s`; NaN deviation: no sample."""
         if math.isnan(deviation_k):
             return self
         if abs(deviation_k) > NEAR_K:

@@ -74,7 +74,7 @@ class Limits:
 
     @property
     def hold_s(self) -> float:
-        """How long the last output is kept without a reading; a slow loop may miss one sample."""
+        """How long an output is kept without a reading; a slow loop may miss one."""
         return max(self.HOLD_S, 1.5 * self.period_s)
 
     def seen_s(self, interval_s: float) -> float:
@@ -82,11 +82,11 @@ class Limits:
         return min(interval_s, self.hold_s)
 
     def valid_until_s(self, t_s: float) -> float:
-        """Return when a command given at `t_s` expires: half a period late, and one second."""
+        """Return when a command of `t_s` expires: half a period late, and a second."""
         return t_s + command_lasts_s(self.period_s)
 
     def accept_setpoint(self, value: object) -> float:
-        """Return `value` as a set point in degC; raise `Refused` naming the range if it is none."""
+        """Return `value` as a set point in degC; raise `Refused` naming the range."""
         allowed = f"a set point from {self.setpoint_min_c:g} to {self.setpoint_max_c:g} degC"
         if not is_finite_number(value):
             raise Refused(f"expected {allowed}, got {value!r}")

@@ -75,7 +75,7 @@ class Plan:
 
 
 class Regulator:
-    """Keeps one loop: what the operator wants, what is believed, what the heater may do.
+    """Keeps one loop: what is wanted, what is believed, what the heater may do.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ class Regulator:
     # -- the walk of a sample --------------------------------------------------------------------
 
     def step(self, measurement: Measurement) -> Step:
-        """Return what is made of `measurement`; never raises, whatever a sensor can produce."""
+        """Return what is made of `measurement`; never raises, whatever it holds."""
         t_s, interval_s = self._time(measurement.t_s)
         applied = self._applied_power()
         verdict = self._supervisor.judge(measurement, t_s, interval_s)
@@ -180,7 +180,7 @@ class Regulator:
             self._applied = clamp(taken, 0.0, 1.0)
 
     def fault(self, code: str, fault: int | None, text: str) -> None:
-        """Report that something outside failed (a board, an output): SAFE from the next step on.
+        """Report that something outside failed: SAFE from the next step on.
 
         Parameters
         ----------

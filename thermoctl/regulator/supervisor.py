@@ -1,4 +1,4 @@
-"""Decides what the heater may do, whatever the operator wants and the controller asks for.
+"""Decides what the heater may do, whatever anybody wants or asks for.
 
 The states and what moves them (times are those of `thermoctl.regulator.limits.Limits`):
 
@@ -78,7 +78,7 @@ class Supervisor:
     # -- judging ---------------------------------------------------------------------------------
 
     def judge(self, measurement: Measurement, t_s: float, interval_s: float) -> Verdict:
-        """Return what `measurement`, `interval_s` after the last one, is worth; remember it."""
+        """Return what `measurement`, `interval_s` after the last, is worth."""
         before = self._judged.verdict
         self._judged = judge(self._judged, measurement, self.limits)
         self._reading = measurement.temperature_c
@@ -100,7 +100,7 @@ class Supervisor:
     # -- state -----------------------------------------------------------------------------------
 
     def rule(self, t_s: float, ride_s: float) -> State:
-        """Return the state after the last reading; `ride_s` is how long the model may steer."""
+        """Return the state after the last reading; the model may steer for `ride_s`."""
         verdict = self.verdict
         if verdict in _TRIPS:
             self._trip(verdict, t_s)
@@ -183,7 +183,7 @@ class Supervisor:
         self._enter(State.LATCHED, code)
 
     def acknowledge(self, code: str | None) -> None:
-        """Acknowledge an alarm, or all; raise `Refused` while the cause of a latch persists."""
+        """Acknowledge an alarm, or all; raise `Refused` while a latch has its cause."""
         meant = [row for row in self.alarms.latched() if code in (None, row.code)]
         if meant and (self.verdict in _CIRCUITS or self.verdict in _TRIPS):
             raise Refused(f"{meant[0].code} still stands: {meant[0].text}")
@@ -198,7 +198,7 @@ class Supervisor:
     # -- power -----------------------------------------------------------------------------------
 
     def bound(self, asked: object, reason: str, t_s: float) -> Command:
-        """Return the command for the power a controller `asked` for; what is no number becomes 0.
+        """Return the command for the power `asked` for; what is no number becomes 0.
 
         The one place where limits hold. Falling is never slowed; nothing at all passes in SAFE,
         LATCHED or while a trip waits to be confirmed.
@@ -233,7 +233,7 @@ class Supervisor:
         return next((row.code for row in rows if row.latched or row.active), self.state.value)
 
     def check_applied(self, commanded: float, applied: float, t_s: float) -> None:
-        """Compare what the hardware took with the command: more, twice in a row, is a fault."""
+        """Compare what was taken with the command: more, twice in a row, is a fault."""
         excess = not applied <= commanded + self.limits.applied_tolerance
         self._excess = self._excess + 1 if excess else 0
         if self._excess >= _FAILED_IN_A_ROW:

@@ -22,7 +22,7 @@ class MonotonicClock:
         self._interrupted = False
 
     def now_s(self) -> float:
-        """Return seconds since an arbitrary zero; never goes back, whatever the wall clock does."""
+        """Return seconds since an arbitrary zero; the wall clock cannot move it."""
         return time.monotonic()
 
     def sleep_until(self, t_s: float) -> None:
@@ -60,7 +60,7 @@ class SimulatedClock:
 
 
 class PacedClock(SimulatedClock):
-    """Simulated time at a fixed ratio to real time, with something to do while it waits.
+    """Simulated time at a fixed ratio to real time; may do something meanwhile.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class PacedClock(SimulatedClock):
         """Called again and again while waiting, with the longest time it may take."""
 
     def sleep_until(self, t_s: float) -> None:
-        """Wait as long as `t_s` takes at this speed; a late wake is made good, not repeated."""
+        """Wait as long as `t_s` takes at this speed; a late wake is made good."""
         while not self._interrupted:
             begin_s = time.monotonic()
             remaining_s = self._anchor_s + t_s / self._speed - begin_s

@@ -1,4 +1,4 @@
-"""A board that may come and go: opened beside the loop, retried with back-off, closed safely."""
+"""A board that may come and go: opened beside the loop, retried, closed safely."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Connection:
     def write(
         self, outputs: Mapping[str, float], valid_for_s: float, deadline_s: float
     ) -> Mapping[str, float]:
-        """Set `outputs` and return what the board took; raise a `DriverError` when it refused."""
+        """Set `outputs`, return what was taken; raise a `DriverError` when refused."""
         board = self._connected()
         zero = not any(outputs.values())
         self._driven = self._driven or not zero
@@ -95,7 +95,7 @@ class Connection:
         return taken
 
     def close(self) -> None:
-        """Let the board go, safe values first; a thread that is still opening closes its own."""
+        """Let the board go, safe values first; one still opening is closed then."""
         self._closed = True
         if self._opening is not None:
             self._opening.join(timeout=0.2)

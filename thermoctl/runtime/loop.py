@@ -98,7 +98,7 @@ class Loop:
         self._requests.put((loop, request))
 
     def stop(self) -> None:
-        """End `run` after the cycle that is under way; safe to call from a signal handler."""
+        """End `run` after the cycle that is under way; a signal handler may call it."""
         self._stopping = True
 
     @property
@@ -113,7 +113,7 @@ class Loop:
     # -- time ------------------------------------------------------------------------------------
 
     def run(self, until_s: float = math.inf) -> None:
-        """Run cycles until `stop` or `until_s`; missed deadlines are counted, never caught up.
+        """Run until `stop` or `until_s`; missed deadlines are never caught up.
 
         `shut_down` must follow, whatever ended it.
         """
@@ -131,7 +131,7 @@ class Loop:
                 self.report("cycle.missed", cycles=skipped, total=self.missed)
 
     def cycle(self, deadline_s: float) -> None:
-        """Walk one sample of every loop; whatever fails, the heaters are off and it is said."""
+        """Walk one sample of every loop; what fails ends in heat off, and is said."""
         self._sound = True
         try:
             self._walk(deadline_s)
@@ -145,7 +145,7 @@ class Loop:
             self._harmless(self._completed)
 
     def shut_down(self) -> bool:
-        """Write power 0 to every board and let them go; return whether no output can be on."""
+        """Write power 0 to every board, let them go; return whether all must be off."""
         confirmed = self._all_off()
         for board in self.boards:
             board.close()

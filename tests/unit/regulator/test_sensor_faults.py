@@ -196,3 +196,21 @@ def test_a_latch_of_an_earlier_run_keeps_the_heater_off_from_the_first_step(driv
     drive.regulator.request(Acknowledge())
     assert drive.run(29).state is State.SAFE
     assert drive.run(5).command.power > 0.0
+
+
+def test_every_change_of_state_is_told_with_what_caused_it(warm):
+    warm.run(3, Quality.SHORT)
+    warm.run(60)
+    told = [event for step in warm.steps for event in step.events if event.name == "state.changed"]
+    assert [(event.fields["before"], event.fields["after"]) for event in told] == [
+        ("run", "safe"),
+        ("safe", "run"),
+    ]
+    assert told[0].fields["why"] == "sensor.short"
+
+
+def test_a_first_reading_beyond_the_limit_is_an_alarm_already(warm):
+    spiked = warm.step(offset_k=40.0)
+    assert [(alarm.code, alarm.latched) for alarm in spiked.alarms] == [
+        ("trip.over_temperature", False)
+    ]
