@@ -203,3 +203,15 @@ def until_collected(connection, reached):
         if connection._opening is not None:
             connection._opening.join()
     assert reached()
+
+
+def test_a_board_that_was_lost_is_given_a_second_before_it_is_opened_again():
+    connection, clock, reports = connected(board([600.0, LinkError("gone")]), board())
+    connection.read(0.2)
+    for _ in range(3):
+        with pytest.raises(LinkError, match="gone"):
+            connection.read(0.2)
+        clock.advance(0.3)
+    clock.advance(0.2)
+    assert connection.read(0.2)
+    assert reports.names() == ["board.opened", "board.lost", "board.opened"]
