@@ -125,12 +125,12 @@ def test_a_control_thread_that_is_ended_leaves_power_0_says_so_and_is_no_success
 
 
 BROKEN_MAIN = """
-store = daemon.Daemon._store_runs
-def broken(self):
+store = daemon.Resumption.store
+def broken(self, settings, cycles):
     if len(powers) >= 3:
         raise RuntimeError("the main thread has a bug")
-    store(self)
-daemon.Daemon._store_runs = broken
+    store(self, settings, cycles)
+daemon.Resumption.store = broken
 """
 
 

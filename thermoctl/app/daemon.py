@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import os
 import signal
 import threading
 import traceback
@@ -16,7 +17,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from thermoctl import __version__
-from thermoctl.app.compose import loop_for, started_as
+from thermoctl.app.compose import loop_for
+from thermoctl.app.resuming import Resumption, kept_latches
 from thermoctl.app.settings import Settings, default_files, load_all
 from thermoctl.errors import ConfigError
 from thermoctl.runtime.clock import MonotonicClock
@@ -27,8 +29,8 @@ from thermoctl.services.latches import LatchKeeper
 from thermoctl.services.lock import DaemonLock, device_lock_path
 from thermoctl.services.notify import Notifier
 from thermoctl.services.places import make_private, runtime_dir, state_dir
-from thermoctl.services.store import LatchStore, RunRecord, RunStore
-from thermoctl.signals import Acknowledge, Alarm, Cycle, Event, Mode, SetPoint
+from thermoctl.services.store import LatchStore
+from thermoctl.signals import Acknowledge, Cycle, Event, SetPoint
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 _TURN_S = 0.2
@@ -82,8 +84,6 @@ class Daemon:
         self._journal = Journal(sink_for())
         self._notifier = Notifier()
         self._latches = LatchStore(directory, run_directory)
-        self._runs = RunStore(directory)
-        self._stored: dict[str, RunRecord] = {}
         self._seen = _Seen()
         self._clock = MonotonicClock()
         self._history: HistoryWriter | None = None
@@ -93,11 +93,12 @@ class Daemon:
                 RunInfo(__version__, settings.as_json()),
                 report=self._journal.emit,
             )
+        self._resumption = Resumption(directory, self._emit)
         self._loop = loop_for(
-            self._resumed(settings),
+            self._resumption.settings(settings),
             self._clock,
             self._publish,
-            latched=self._latched(settings),
+            latched=kept_latches(self._latches, settings, self._emit),
             completed=self._completed,
         )
         self._keeper = LatchKeeper(
@@ -105,36 +106,8 @@ class Daemon:
         )
         self._confirmed = self._failed = self._ready = False
         self._ending = self._reloading = False
-
-    # -- starting where the last run ended -------------------------------------------------------
-
-    def _resumed(self, settings: Settings) -> Settings:
-        """Return `settings` with the modes and set points this start begins with."""
-        starts: dict[str, tuple[Mode, float]] = {}
-        for name, table in settings.loops.items():
-            record, warning = self._runs.load(name)
-            if warning is not None:
-                self._emit("state.ignored", name, why=warning)
-            if record is None:
-                continue
-            if not table.resume:
-                starts[name] = (Mode.OFF, table.setpoint_c)
-                self._emit("loop.not_resumed", name, was=record.mode.value)
-            else:
-                low_c, high_c = table.setpoint_range_c
-                within = low_c <= record.setpoint_c <= high_c
-                mode = Mode.OFF if record.mode is Mode.PROGRAM else record.mode
-                starts[name] = (mode, record.setpoint_c if within else table.setpoint_c)
-        return started_as(settings, starts)
-
-    def _latched(self, settings: Settings) -> dict[str, Alarm]:
-        found = {}
-        for name in settings.loops:
-            latch = self._latches.load(name)
-            if latch is not None:
-                found[name] = Alarm(latch.code, latch.fault, 1, 0.0, latch.text, latched=True)
-                self._emit("latch.kept", name, code=latch.code, text=latch.text)
-        return found
+        # A service reloads at a hang-up; who started it by hand and closed the terminal is gone.
+        self._on_terminal = os.isatty(0)
 
     # -- running ---------------------------------------------------------------------------------
 
@@ -164,7 +137,7 @@ class Daemon:
                 control.join(_STOP_S)
                 self._say_the_rest()
                 self._emit("loop.stopped", None, power_0_confirmed=self._confirmed)
-            self._store_runs()
+            self._resumption.store(self._settings, dict(self._seen.cycles))
         return self._confirmed and not self._failed
 
     def _control(self) -> None:
@@ -195,7 +168,7 @@ class Daemon:
             if self._reloading:
                 self._reloading = False
                 self._reload()
-            self._store_runs()
+            self._resumption.store(self._settings, dict(self._seen.cycles))
 
     def _note_signal(self, number: int, frame: object) -> None:
         """Only set flags: this runs in the middle of whatever the main thread is doing.
@@ -203,20 +176,10 @@ class Daemon:
         A handler, and not a blocked signal that is waited for: libraries start threads of their
         own that block nothing, and the kernel would end the process through one of them.
         """
-        if number == signal.SIGHUP:
+        if number == signal.SIGHUP and not self._on_terminal:
             self._reloading = True
         else:
             self._stop()
-
-    def _store_runs(self) -> None:
-        for name, cycle in list(self._seen.cycles.items()):
-            record = RunRecord(cycle.step.mode, cycle.step.setpoint_c)
-            if self._stored.get(name) != record:
-                with contextlib.suppress(
-                    OSError
-                ):  # a full or read-only disk: tried again next turn
-                    self._runs.save(name, record)
-                    self._stored[name] = record
 
     # -- called by the loop's thread ---------------------------------------------------------------
 

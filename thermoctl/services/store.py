@@ -13,7 +13,7 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
@@ -234,10 +234,20 @@ class LatchStore:
 
 @dataclass(frozen=True, slots=True)
 class RunRecord:
-    """What a loop was doing, so that the next start knows that it is a restart."""
+    """What a loop was doing, so that the next start knows that it is a restart.
+
+    Parameters
+    ----------
+    mode, setpoint_c
+        What the operator wanted last.
+    configured_mode, configured_setpoint_c
+        What the configuration said then; an edited one is a newer wish. None: not known.
+    """
 
     mode: Mode
     setpoint_c: float
+    configured_mode: Mode | None = None
+    configured_setpoint_c: float | None = None
 
 
 class RunStore:
@@ -256,8 +266,7 @@ class RunStore:
         ValueError
             The set point is not finite.
         """
-        document = {"loop": loop, "mode": record.mode.value, "setpoint_c": record.setpoint_c}
-        self._store.write(_run(loop), document)
+        self._store.write(_run(loop), {"loop": loop, **asdict(record)})
 
     def load(self, loop: str) -> tuple[RunRecord | None, str | None]:
         """Return the record of `loop`, or None and, where there should be one, a warning."""
@@ -265,10 +274,17 @@ class RunStore:
         if stored.document is None:
             return None, stored.warning
         try:
-            mode = Mode(str(stored.document.get("mode")))
-            return RunRecord(mode, _finite(stored.document, "setpoint_c")), None
+            return _as_run(stored.document), None
         except ValueError as error:
             return None, f"{self._store.path_of(_run(loop))} is ignored: {error}"
+
+
+def _as_run(document: Mapping[str, Any]) -> RunRecord:
+    mode, setpoint_c = Mode(str(document.get("mode"))), _finite(document, "setpoint_c")
+    if document.get("configured_mode") is None:
+        return RunRecord(mode, setpoint_c)
+    configured = Mode(str(document["configured_mode"]))
+    return RunRecord(mode, setpoint_c, configured, _finite(document, "configured_setpoint_c"))
 
 
 def _latch(loop: str) -> str:

@@ -1,0 +1,92 @@
+"""Where a start takes up what the last run left: modes, set points and latches.
+
+A restarted loop is off unless its configuration says ``resume = true``. What is edited in the
+configuration since is a newer wish than what was stored, and counts as a first start.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from thermoctl.app.compose import started_as
+from thermoctl.app.settings import Settings
+from thermoctl.app.tables import LoopTable
+from thermoctl.services.store import LatchStore, RunRecord, RunStore
+from thermoctl.signals import Alarm, Cycle, Mode
+
+Emit = Callable[..., None]
+_HOW = "set resume = true, or edit mode, and start again"
+
+
+class Resumption:
+    """What a start takes up, and what it leaves behind for the next one.
+
+    Parameters
+    ----------
+    directory : Path
+        The state folder.
+    emit : callable
+        Called as ``emit(name, loop, **fields)`` for what the operator should know.
+    """
+
+    def __init__(self, directory: Path, emit: Emit) -> None:
+        self._runs = RunStore(directory)
+        self._emit = emit
+        self._stored: dict[str, RunRecord] = {}
+
+    def settings(self, settings: Settings) -> Settings:
+        """Return `settings` with the modes and set points this start begins with."""
+        starts = {name: self._start(name, table) for name, table in settings.loops.items()}
+        return started_as(settings, starts)
+
+    def _start(self, name: str, table: LoopTable) -> tuple[Mode, float]:
+        record, warning = self._runs.load(name)
+        if warning is not None:
+            self._emit("state.ignored", name, why=warning)
+        if record is None:
+            return table.mode, table.setpoint_c
+        setpoint_c = _setpoint(record, table)
+        if record.configured_mode not in (None, table.mode):
+            return table.mode, setpoint_c
+        if table.resume:
+            return Mode.OFF if record.mode is Mode.PROGRAM else record.mode, setpoint_c
+        # Kept as it was: a start that only stays off is no wish to be off.
+        self._stored[name] = _configured(RunRecord(Mode.OFF, table.setpoint_c), table)
+        if record.mode is not Mode.OFF:
+            self._emit("loop.not_resumed", name, was=record.mode.value, to_resume=_HOW)
+        return Mode.OFF, table.setpoint_c
+
+    def store(self, settings: Settings, cycles: Mapping[str, Cycle]) -> None:
+        """Store what changed; a full or read-only disk is tried again at the next call."""
+        for name, cycle in cycles.items():
+            record = RunRecord(cycle.step.mode, cycle.step.setpoint_c)
+            record = _configured(record, settings.loops[name])
+            if self._stored.get(name) != record:
+                with contextlib.suppress(OSError):
+                    self._runs.save(name, record)
+                    self._stored[name] = record
+
+
+def _setpoint(record: RunRecord, table: LoopTable) -> float:
+    """Return the stored set point, unless the configured one is newer or excludes it."""
+    low_c, high_c = table.setpoint_range_c
+    edited = record.configured_setpoint_c not in (None, table.setpoint_c)
+    stored = low_c <= record.setpoint_c <= high_c and not edited
+    return record.setpoint_c if stored else table.setpoint_c
+
+
+def _configured(record: RunRecord, table: LoopTable) -> RunRecord:
+    return RunRecord(record.mode, record.setpoint_c, table.mode, table.setpoint_c)
+
+
+def kept_latches(latches: LatchStore, settings: Settings, emit: Emit) -> dict[str, Alarm]:
+    """Return the latches of earlier runs by loop; each is told of."""
+    kept = {}
+    for name in settings.loops:
+        latch = latches.load(name)
+        if latch is not None:
+            kept[name] = Alarm(latch.code, latch.fault, 1, 0.0, latch.text, latched=True)
+            emit("latch.kept", name, code=latch.code, text=latch.text)
+    return kept
