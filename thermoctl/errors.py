@@ -22,7 +22,7 @@ class Refused(ThermoctlError, ValueError):  # noqa: N818 - it is an answer, not 
 
 
 class Unavailable(ThermoctlError):  # noqa: N818
-    """Something needed is not installed or not there; the message says what to install."""
+    """Something needed is not there; the message says what to install."""
 
 
 class DriverError(ThermoctlError):
@@ -30,7 +30,7 @@ class DriverError(ThermoctlError):
 
 
 class TransientError(DriverError):
-    """One exchange failed (time-out, checksum); asking again within the period may help."""
+    """One exchange failed (time-out, checksum); asking again may help."""
 
 
 class FaultError(DriverError):

@@ -14,7 +14,7 @@ from thermoctl.signals import Beliefs, Estimate, RawSample
 
 
 class Clock(Protocol):
-    """Monotonic time; a simulated clock makes an hour run in seconds with the same code."""
+    """Monotonic time; with a simulated clock an hour runs in seconds."""
 
     def now_s(self) -> float:
         """Return the time in s; its zero is arbitrary and it never goes back."""
@@ -26,7 +26,7 @@ class Clock(Protocol):
 
 
 class Link(Protocol):
-    """A byte stream with time-outs, as pyserial offers it; so a pty or a socket fits as well."""
+    """A byte stream with time-outs, as pyserial offers it; a pty fits as well."""
 
     timeout: float | None
     write_timeout: float | None
@@ -77,7 +77,7 @@ class Health:
 
 
 class Board(Protocol):
-    """Hardware with inputs and outputs. Synchronous; every call has a deadline on the clock.
+    """Hardware with inputs and outputs; every call blocks until a deadline.
 
     A class is built as ``Driver(settings, link, clock)`` and does no I/O before `open`.
     `read` and `write` raise a `thermoctl.errors.DriverError`, never anything else.
@@ -87,7 +87,7 @@ class Board(Protocol):
     capabilities: Capabilities
 
     def open(self, deadline_s: float) -> Identity:
-        """Write power 0 first, then identify the board; raise `LinkError` or `WrongDevice`."""
+        """Write power 0, then identify the board; `LinkError` or `WrongDevice`."""
         ...
 
     def read(self, deadline_s: float) -> Mapping[str, RawSample]:
@@ -123,7 +123,7 @@ class Simulated(Protocol):
 
 
 class Estimator(Protocol):
-    """A law of estimation: frozen, holds constants only; the belief goes in and comes out."""
+    """A law of estimation: frozen; a belief goes in and comes out."""
 
     def update(self, belief: Estimate, phi: Array, y: float) -> Estimate:
         """Return the belief after regressor `phi`, shape (n,), met output `y`."""
@@ -162,7 +162,7 @@ class Situation:
 
 
 class Controller(Protocol):
-    """A law of control: frozen; what it must remember is a belief that goes in and comes out."""
+    """A law of control: frozen; what it remembers goes in and comes out."""
 
     name: ClassVar[str]
 
@@ -180,5 +180,5 @@ class Controller(Protocol):
 
     @property
     def ride_s(self) -> float:
-        """How long the model may steer without a sensor: three lags it was built for, or 0."""
+        """How long the model may steer without a sensor: three lags, or 0."""
         ...

@@ -19,7 +19,7 @@ ZERO_CELSIUS_K = 273.15
 
 
 def is_finite_number(value: Any) -> bool:
-    """Return whether `value` is a real number that is neither NaN nor infinite; bool is none."""
+    """Return whether `value` is a finite real number; bool is none."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return False
     try:
@@ -29,7 +29,7 @@ def is_finite_number(value: Any) -> bool:
 
 
 def clamp(value: float, low: float, high: float) -> float:
-    """Return `value` limited to [low, high]; NaN becomes `low`, the safe end of every output."""
+    """Return `value` limited to [low, high]; NaN becomes `low`, the safe end."""
     if not value >= low:  # written so that NaN fails too
         return low
     return min(value, high)

@@ -1,4 +1,4 @@
-"""What travels through the house: frozen values, one for each step of a sample's walk.
+"""What travels through the house: frozen values, one a step of the walk.
 
     RawSample -> Measurement -> Estimate -> Command -> Step -> Cycle
 
@@ -92,7 +92,7 @@ class ManualPower:
 
 @dataclass(frozen=True, slots=True)
 class Acknowledge:
-    """Request: acknowledge the alarm `code`, or all of them; clears a latch whose cause is gone."""
+    """Request: acknowledge `code`, or all; clears a latch without a cause."""
 
     code: str | None = None
 
@@ -192,7 +192,7 @@ class Alarm:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A change of state worth a line in the journal; `name` is API, values travel as fields."""
+    """A change of state worth a line in the journal; `name` is API."""
 
     t_s: float
     name: str

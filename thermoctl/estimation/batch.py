@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from thermoctl.estimation.belief import LARGEST, frozen, start
+from thermoctl.estimation.belief import LARGEST, floats, frozen, start
 from thermoctl.estimation.recursion import ARRAYS, RecursiveLaw, drift
 from thermoctl.quantities import Array
 from thermoctl.signals import Estimate
@@ -70,12 +70,12 @@ def run_batch(
     TypeError
         `law` is none of the bare laws (a guarded one keeps a memory of its own).
     ValueError
-        `y`, `phi`, `P0` or `theta0` has another shape, or R1 does not fit.
+        `y`, `phi`, `P0` or `theta0` does not consist of numbers or has another shape, or R1 does
+        not fit.
     """
     if not isinstance(law, RecursiveLaw):
         raise TypeError(f"law must be a bare estimator, got {type(law).__name__}")
-    y = np.asarray(y, dtype=np.float64)
-    phi = np.asarray(phi, dtype=np.float64)
+    y, phi = floats("y", y), floats("phi", phi)
     if y.ndim != 2:
         raise ValueError(f"y must have shape (T, R), got {y.shape}")
     if phi.ndim != 3 or phi.shape[:2] != y.shape or phi.shape[2] < 1:

@@ -48,7 +48,7 @@ def frozen(values: Array) -> Array:
 
 
 def covariance(name: str, value: float | npt.ArrayLike, n: int | None = None) -> Array:
-    """Return a read-only covariance matrix made of `value`, a matrix or a float times I.
+    """Return a read-only covariance matrix from a matrix or a float times I.
 
     Raises
     ------
@@ -85,20 +85,25 @@ def positive(name: str, value: float, at_most: float = LARGEST) -> None:
 
 
 def numbers(name: str, value: npt.ArrayLike) -> Array:
-    """Return `value` as a new array of finite floats, or raise ``ValueError`` naming it.
+    """Return `value` as a new array of finite floats; ``ValueError`` if not."""
+    array = floats(name, value).copy()
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got {value!r}")
+    return array
+
+
+def floats(name: str, value: npt.ArrayLike) -> Array:
+    """Return `value` as an array of floats, or raise ``ValueError`` naming it.
 
     Text, truth values and complex numbers are no numbers here, though NumPy would convert them.
     """
     try:
         given = np.asarray(value)
-        array = None if given.dtype.kind in "bcSU" else np.array(given, dtype=np.float64)
+        if given.dtype.kind not in "bcSU":
+            return np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name} must consist of numbers, got {value!r}") from error
-    if array is None:
-        raise ValueError(f"{name} must consist of numbers, got {value!r}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {value!r}")
-    return array
+    raise ValueError(f"{name} must consist of numbers, got {value!r}")
 
 
 def _parameters(name: str, value: npt.ArrayLike | None, n: int) -> Array:

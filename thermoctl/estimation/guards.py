@@ -1,4 +1,4 @@
-"""What keeps a recursive estimator sane for years, as a wrapper around any of the bare laws.
+"""What keeps a recursive estimator sane for years: a wrapper of any law.
 
 Implements section 4 of ``docs/theory.md``.
 """

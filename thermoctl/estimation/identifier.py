@@ -19,7 +19,7 @@ from thermoctl.signals import Estimate
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IdentifierBelief:
-    """An estimate and the past its next regressor is made of; the arrays are read-only.
+    """An estimate and the past of its next regressor; arrays read-only.
 
     Parameters
     ----------
@@ -102,13 +102,13 @@ class Identifier:
         return IdentifierBelief(estimate, _pushed(belief.y_past_c, temperature_c), u_past)
 
     def predict(self, belief: IdentifierBelief, applied: float) -> float:
-        """Return the next temperature in degC if `applied` is given until then; NaN: not known."""
+        """Return the next temperature in degC under `applied`; NaN: not known."""
         u_past = _pushed(belief.u_past, applied)
         phi = self.structure.regressor(belief.y_past_c, u_past)
         return self.structure.temperature(float(belief.estimate.theta.dot(phi)), u_past)
 
     def foresee(self, belief: IdentifierBelief, applied: float) -> IdentifierBelief:
-        """Return the belief one sample on without a reading: the prediction stands in for it.
+        """Return the belief one sample on, a prediction in place of a reading.
 
         Nothing is learned. Meant for riding through a short gap, beside the belief that keeps the
         gap: learning from one's own predictions would only confirm them.

@@ -1,4 +1,4 @@
-"""Kalman filters for parameters that walk at random: the normal and the corrected one.
+"""Kalman filters for parameters that wander: normal and corrected.
 
 Implements section 2 of ``docs/theory.md``.
 """
@@ -46,7 +46,7 @@ class RandomWalkKalman(RecursiveLaw):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorrectedKalman(RecursiveLaw):
-    r"""The Kalman filter that inflates P when an innovation is too large, O21 (25)-(26).
+    r"""The Kalman filter that inflates P on large innovations, O21 (25)-(26).
 
     The ratio (26) is the normalised innovation squared over ``n + 1``:
 

@@ -23,12 +23,15 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from thermoctl.estimation.belief import LARGEST, covariance, frozen, numbers
+from thermoctl.estimation.belief import LARGEST, covariance, floats, frozen, numbers
 from thermoctl.quantities import Array, is_finite_number
 from thermoctl.signals import Estimate
 
 V = TypeVar("V", float, Array)
 """A number of one loop, or one for each replication."""
+
+
+_FLOAT = np.dtype(np.float64)
 
 
 class Arithmetic(NamedTuple, Generic[V]):
@@ -80,9 +83,11 @@ class RecursiveLaw(ABC):
         Raises
         ------
         ValueError
-            `phi` does not have the shape of ``belief.theta``, or R1 that of ``belief.P``.
+            `phi` or `y` does not consist of numbers; `phi` does not have the shape of
+            ``belief.theta``, or R1 that of ``belief.P``.
         """
-        phi = np.asarray(phi, dtype=np.float64)
+        if not (isinstance(phi, np.ndarray) and phi.dtype is _FLOAT):
+            phi = floats("phi", phi)
         theta, P = belief.theta, belief.P
         if phi.shape != theta.shape:
             raise ValueError(f"phi must have shape {theta.shape}, got {phi.shape}")
@@ -91,7 +96,7 @@ class RecursiveLaw(ABC):
         if not sum(map(abs, phi.tolist())) < LARGEST:
             return rejected(belief)
         P_phi = P.dot(phi)  # ndarray.dot, not @: it is twice as fast on small arrays
-        e = float(y) - float(theta.dot(phi))
+        e = _number(y) - float(theta.dot(phi))
         q = max(float(phi.dot(P_phi)), 0.0)  # rounding can leave a vanishing one below zero
         S, inflation = self.weigh(q, e, len(theta), NUMBERS)
         if not e * e < LARGEST * S < math.inf:
@@ -113,6 +118,14 @@ class RecursiveLaw(ABC):
         return Estimate(frozen(theta), frozen(P), e, S, inflation, False)
 
 
+def _number(y: float) -> float:
+    """Return the output `y` as a float; raise ValueError when it is no number."""
+    try:
+        return float(y + 0.0)  # which text cannot do, though `float` alone would take it
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"y must be a number, got {y!r}") from error
+
+
 def rejected(belief: Estimate) -> Estimate:
     """Return `belief` with nothing changed but the mark that a sample was not used."""
     return replace(belief, rejected=True)
@@ -129,7 +142,7 @@ def checked_drift(value: float | Array) -> float | Array:
 
 
 def drift(R1: float | Array, n: int) -> Array:
-    """Return R1 as a matrix of shape (n, n); raise ``ValueError`` when it has another shape."""
+    """Return R1 as a matrix of shape (n, n); ``ValueError`` if it has another."""
     if not isinstance(R1, np.ndarray):
         return R1 * identity(n)
     if R1.shape != (n, n):
