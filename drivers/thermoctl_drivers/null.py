@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from typing import ClassVar, Literal, Self
@@ -12,6 +13,7 @@ from thermoctl.errors import BoardConfigError, LinkError
 from thermoctl.ports import Capabilities, Clock, Health, Identity, Link
 from thermoctl.quantities import ZERO_CELSIUS_K
 from thermoctl.signals import RawSample
+from thermoctl_drivers.outputs import commanded
 
 INPUT = "temperature"
 OUTPUT = "heater"
@@ -115,11 +117,15 @@ class NullBoard:
             When it is not open.
         BoardConfigError
             When there is no such output.
+        FaultError
+            When the power or the time is infinite or no number.
         """
-        del valid_for_s, deadline_s
+        del deadline_s
         self._check_open()
         if unknown := sorted(set(outputs) - {OUTPUT}):
             raise BoardConfigError(f"the only output is {OUTPUT!r}, got {unknown}")
+        for name, power in outputs.items():
+            commanded(name, power, valid_for_s, math.inf)  # a dry run shows what a board refuses
         self._counters["writes"] += 1
         return dict.fromkeys(outputs, 0.0)
 

@@ -24,6 +24,7 @@ from thermoctl.plant.tolerances import specimen
 from thermoctl.ports import Capabilities, Clock, Health, Identity, Link
 from thermoctl.quantities import clamp
 from thermoctl.signals import RawSample
+from thermoctl_drivers.outputs import commanded
 
 INPUT = "temperature"
 OUTPUT = "heater"
@@ -174,6 +175,8 @@ class SimulatedBoard:
             When the board is not open.
         BoardConfigError
             When there is no such output; nothing is changed.
+        FaultError
+            When the drive or the time is infinite or no number; the heater is off then.
         """
         del deadline_s
         for name in outputs:
@@ -182,9 +185,12 @@ class SimulatedBoard:
         self._catch_up()
         self._counters["writes"] += 1
         if OUTPUT in outputs:
-            wished = clamp(outputs[OUTPUT], 0.0, 1.0)
+            self._drive = 0.0  # and so it stays when what is asked is no command
+            wished, held_s = commanded(
+                OUTPUT, outputs[OUTPUT], valid_for_s, self._settings.dead_man_s
+            )
             self._drive = round(wished * self._drive_steps) / self._drive_steps
-            self._armed_until_s = self._now_s + clamp(valid_for_s, 0.0, self._settings.dead_man_s)
+            self._armed_until_s = self._now_s + held_s
         return {OUTPUT: self._drive}
 
     def health(self) -> Health:

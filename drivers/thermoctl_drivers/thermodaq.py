@@ -23,9 +23,9 @@ from thermoctl.errors import (
     WrongDevice,
 )
 from thermoctl.ports import Capabilities, Clock, Health, Identity, Link
-from thermoctl.quantities import clamp
 from thermoctl.signals import RawSample
 from thermoctl_drivers import thermodaq_frames as frames
+from thermoctl_drivers.outputs import commanded
 from thermoctl_drivers.thermodaq_exchange import LINK_ERRORS, Answer, Exchange, RefusedByBoard
 from thermoctl_drivers.thermodaq_frames import Flag, FrameError, Refusal, Reply
 
@@ -175,7 +175,8 @@ class ThermoDaq:
         TransientError
             When three attempts brought no valid reply before `deadline_s`.
         FaultError
-            When the board refused three times, or took more than it was told.
+            When the board refused three times, or took more than it was told; when the power or
+            the time is infinite or no number, and the board has been told power 0 then.
         BoardConfigError
             When `outputs` names one that the board does not have.
         LinkError
@@ -187,8 +188,14 @@ class ThermoDaq:
                 raise BoardConfigError(f"the only output is {OUTPUT!r}, got {unknown}")
             if OUTPUT not in outputs:
                 return {}
-            valid_ms = int(clamp(valid_for_s, 0.0, self._settings.dead_man_s) * 1000.0)
-            power = round(clamp(outputs[OUTPUT], 0.0, 1.0) * frames.FULL_POWER)
+            try:
+                wished, held_s = commanded(
+                    OUTPUT, outputs[OUTPUT], valid_for_s, self._settings.dead_man_s
+                )
+            except FaultError:
+                self._command(0, 1, deadline_s)
+                raise
+            valid_ms, power = int(held_s * 1000.0), round(wished * frames.FULL_POWER)
             taken = self._command(power if valid_ms > 0 else 0, max(valid_ms, 1), deadline_s)
             return {OUTPUT: taken / frames.FULL_POWER}
 

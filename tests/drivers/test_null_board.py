@@ -7,7 +7,7 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from thermoctl.errors import BoardConfigError
+from thermoctl.errors import BoardConfigError, FaultError
 from thermoctl.model.sensor import LM335, Sensor
 from thermoctl.testing import ManualClock
 from thermoctl_drivers.null import NullBoard, NullSettings
@@ -52,3 +52,10 @@ def test_no_power_is_ever_taken() -> None:
     assert board.write({"heater": 1.0}, 2.5, 10.0) == {"heater": 0.0}
     with pytest.raises(BoardConfigError, match="heater"):
         board.write({"cooler": 1.0}, 2.5, 10.0)
+
+
+@pytest.mark.parametrize("power", [None, "1", math.inf, True])
+def test_a_dry_run_refuses_what_a_board_refuses(power) -> None:
+    board, _ = opened()
+    with pytest.raises(FaultError, match="heater: expected a finite number"):
+        board.write({"heater": power}, 2.5, 10.0)

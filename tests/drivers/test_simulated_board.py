@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from thermoctl.errors import BoardConfigError, LinkError, Refused
+from thermoctl.errors import BoardConfigError, FaultError, LinkError, Refused
 from thermoctl.model.sensor import LM335, Sensor
 from thermoctl.ports import Board, Simulated
 from thermoctl.signals import Quality
@@ -157,6 +157,27 @@ def test_a_write_returns_what_the_converter_took():
 def test_a_wild_drive_is_limited_and_what_is_no_number_is_off(wished, taken):
     clock = HandClock()
     assert write(board_on(clock), clock, wished) == {"heater": taken}
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"drive": None},
+        {"drive": "1"},
+        {"drive": True},
+        {"drive": math.inf},
+        {"drive": 10**400},
+        {"valid_for_s": None},
+        {"valid_for_s": math.inf},
+    ],
+)
+def test_what_is_no_command_is_a_fault_and_the_heater_goes_off(asked):
+    clock = HandClock()
+    board = board_on(clock)
+    write(board, clock, 0.5)
+    with pytest.raises(FaultError, match="expected a finite number, got"):
+        write(board, clock, **{"drive": 1.0, **asked})
+    assert board.write({}, 2.5, clock.t_s) == {"heater": 0.0}
 
 
 def test_an_output_that_is_not_there_is_refused_and_changes_nothing():

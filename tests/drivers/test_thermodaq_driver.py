@@ -207,6 +207,14 @@ def test_power_and_validity_are_bounded_before_they_are_sent(
     assert line.finished
 
 
+@pytest.mark.parametrize(("power", "valid_for_s"), [(math.inf, 2.5), (None, 2.5), (1.0, "2")])
+def test_what_is_no_command_is_a_fault_and_sent_as_power_0(power, valid_for_s) -> None:
+    board, line, clock = rig(Turn(asks(4, "W", 0, 1), says("04 W 0 1 10")))
+    with pytest.raises(FaultError, match="expected a finite number"):
+        write(board, clock, power, valid_for_s)
+    assert line.finished
+
+
 def test_an_unknown_output_is_refused_before_anything_is_sent() -> None:
     board, line, clock = rig()
     with pytest.raises(BoardConfigError, match="heater"):
