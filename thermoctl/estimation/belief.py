@@ -99,6 +99,8 @@ def floats(name: str, value: npt.ArrayLike) -> Array:
     """
     try:
         given = np.asarray(value)
+        if given.dtype.kind == "O":
+            given = given + 0.0  # which None and text cannot do, though NumPy would convert them
         if given.dtype.kind not in "bcSU":
             return np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:

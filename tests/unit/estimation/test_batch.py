@@ -93,6 +93,16 @@ def test_samples_of_the_wrong_shape_are_named(y, phi, name):
         run_batch(CorrectedKalman(), y, phi)
 
 
+@pytest.mark.parametrize("wrong", ["warm", "1", None, 1j])
+@pytest.mark.parametrize("name", ["y", "phi"])
+def test_samples_that_are_no_numbers_are_named(name, wrong):
+    samples = {"y": [[1.0, 2.0]], "phi": [[[1.0], [2.0]]]}
+    row = samples[name][0]
+    row[1] = wrong if name == "y" else [wrong]
+    with pytest.raises(ValueError, match=f"^{name} must consist of numbers, got "):
+        run_batch(CorrectedKalman(), **samples)
+
+
 def test_a_drift_and_a_start_that_do_not_fit_are_named():
     y, phi = np.zeros((5, 2)), np.zeros((5, 2, 3))
     with pytest.raises(ValueError, match="R1"):

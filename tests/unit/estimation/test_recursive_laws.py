@@ -328,3 +328,23 @@ def test_a_law_keeps_its_own_copy_of_its_constants():
     assert np.array_equal(law.R1, np.eye(2))
     assert np.array_equal(belief.P, np.eye(2))
     assert np.array_equal(belief.theta, np.zeros(2))
+
+
+@by_law
+@pytest.mark.parametrize("y", [None, "3", "warm", 1j, [1.0, 2.0]])
+def test_an_output_that_is_no_number_is_named(law, y):
+    with pytest.raises(ValueError, match="y must be a number, got "):
+        law.update(start(2), np.ones(2), y)
+
+
+@by_law
+@pytest.mark.parametrize("phi", [["1", "2"], [None, 1.0], "12", [1j, 1.0], [True, False]])
+def test_a_regressor_that_is_no_number_is_named(law, phi):
+    with pytest.raises(ValueError, match="phi must consist of numbers, got "):
+        law.update(start(2), phi, 1.0)
+
+
+def test_an_output_of_half_the_precision_is_not_rounded_further():
+    y, theta0 = np.float32(0.1), [1.0 / 3.0]
+    learnt = RandomWalkKalman().update(start(1, theta0=theta0), np.ones(1), y)
+    assert learnt.innovation == float(y) - 1.0 / 3.0
