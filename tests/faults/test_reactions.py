@@ -532,6 +532,8 @@ def test_no_key_of_the_live_view_asks_for_a_set_point_out_of_range(setpoint_c: f
     assert len(steps) == 4
     for action in steps * 20:
         request = desk.press(action, Mode.AUTO, setpoint_c)
+        if request is None:  # at the limit there is nothing left to ask for
+            continue
         assert isinstance(request, SetPoint)
         assert 5.0 <= request.value_c <= 55.0
         tank.loop.wirings[0].regulator.request(request)

@@ -77,6 +77,14 @@ class Limits:
         """How long an output is kept without a reading; a slow loop may miss one."""
         return max(self.HOLD_S, 1.5 * self.period_s)
 
+    @property
+    def unsteady_s(self) -> float:
+        """How long an output is kept while readings come that are outliers.
+
+        Long enough for the third one, which may be the truth, also where the period is long.
+        """
+        return max(self.hold_s, (self.OUTLIERS + 0.5) * self.period_s)
+
     def seen_s(self, interval_s: float) -> float:
         """Return how much of the time since the last sample a good reading answers for."""
         return min(interval_s, self.hold_s)

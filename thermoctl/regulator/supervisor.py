@@ -159,9 +159,12 @@ class Supervisor:
     def _blind(self, t_s: float, ride_s: float) -> None:
         """No reading to act on: ride on the model, else hold, else be safe."""
         limits, blind_s = self.limits, self._blind_s
-        rides, holds = blind_s < min(ride_s, limits.RIDE_S), blind_s < limits.hold_s
-        if not (rides or holds) or blind_s >= limits.RIDE_ALARM_S:
-            text = f"expected a reading every {limits.period_s:g} s, none for {blind_s:.0f} s"
+        missing = self.verdict is Verdict.MISSING
+        patience_s = limits.hold_s if missing else limits.unsteady_s
+        rides, holds = blind_s < min(ride_s, limits.RIDE_S), blind_s < patience_s
+        if not (rides or holds) or (missing and blind_s >= limits.RIDE_ALARM_S):
+            what = "reading" if missing else "believable reading"
+            text = f"expected a {what} every {limits.period_s:g} s, none for {blind_s:.0f} s"
             self._raise("sensor.missing", 16, text, t_s, priority=1 if not rides else 2)
         if self.state in (State.SAFE, State.LATCHED):
             return
@@ -184,6 +187,9 @@ class Supervisor:
 
     def acknowledge(self, code: str | None) -> None:
         """Acknowledge an alarm, or all; raise `Refused` while a latch has its cause."""
+        known = [row.code for row in self.alarms.rows()]
+        if code is not None and code not in known:
+            raise Refused(f"expected an alarm of {known or 'none'}, got {code!r}")
         meant = [row for row in self.alarms.latched() if code in (None, row.code)]
         if meant and (self.verdict in _CIRCUITS or self.verdict in _TRIPS):
             raise Refused(f"{meant[0].code} still stands: {meant[0].text}")

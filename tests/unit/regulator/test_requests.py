@@ -84,3 +84,9 @@ def test_every_change_is_an_event(warm):
 def test_a_loop_that_starts_in_manual_starts_at_power_0(drive_with):
     drive = drive_with(water_c=20.0, mode="manual")
     assert drive.run(10).command.power == 0.0
+
+
+@pytest.mark.parametrize("code", ["sensor.open", "nonsense", 3])
+def test_acknowledging_an_alarm_that_is_not_there_is_refused(warm, code):
+    with pytest.raises(Refused, match="expected an alarm of none"):
+        warm.regulator.request(Acknowledge(code))

@@ -214,3 +214,14 @@ def test_a_first_reading_beyond_the_limit_is_an_alarm_already(warm):
     assert [(alarm.code, alarm.latched) for alarm in spiked.alarms] == [
         ("trip.over_temperature", False)
     ]
+
+
+@pytest.mark.parametrize("period_s", [1.0, 2.0, 5.0, 10.0])
+def test_two_outliers_in_a_row_are_no_fault_at_any_period(drive_with, period_s):
+    regulator = drive_with(period_s=period_s).regulator
+    readings = [30.0] * 40 + [34.0, 33.0] + [30.0] * 5
+    steps = [
+        regulator.step(Measurement(k * period_s, reading)) for k, reading in enumerate(readings)
+    ]
+    assert {step.state for step in steps} == {State.RUN, State.HOLD}
+    assert not any(step.alarms for step in steps)
