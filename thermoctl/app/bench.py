@@ -22,9 +22,10 @@ import click
 
 from thermoctl import __version__
 from thermoctl.app.compose import loop_for
-from thermoctl.app.live import Action, Desk, Facts, Keys, LiveModel, LiveScreen
+from thermoctl.app.live import Action, Desk, Facts, Keys, LiveModel, LiveScreen, look_for
 from thermoctl.app.live.desk import DISTURBANCES
-from thermoctl.app.report import Summary, as_line
+from thermoctl.app.live.look import printable
+from thermoctl.app.report import Summary, as_line, closing_lines
 from thermoctl.app.settings import Settings
 from thermoctl.errors import Refused
 from thermoctl.ports import Simulated
@@ -92,10 +93,9 @@ def _tell(summary: Summary, options: BenchOptions) -> None:
         sys.stdout.write(json.dumps({"summary": figures}, allow_nan=False) + "\n")
         sys.stdout.flush()
         return
-    words = ", ".join(
-        f"{name} {'–' if value is None else value}" for name, value in figures.items()
-    )
-    click.echo(words, err=True)
+    look = look_for(sys.stderr.encoding)
+    for line in closing_lines(figures):
+        click.echo(printable(line, utf8=look.utf8), err=True)
 
 
 def _json_lines(loop: Loop, *, flush: bool) -> Callable[[Cycle], None]:
@@ -159,6 +159,7 @@ class _LiveBench:
         self._desk = Desk(model.facts)
         self._last: Cycle | None = None
         self._drawn_s = 0.0
+        self._paused = False
 
     @staticmethod
     @contextmanager
@@ -187,7 +188,7 @@ class _LiveBench:
         """Spend up to `timeout_s` on keys, then draw if it is time to."""
         for action in self._keys.poll(min(timeout_s, _DRAW_S)):
             self._obey(action)
-        self._screen.draw(self._clock.now_s(), self._desk.prompt)
+        self._screen.draw(self._clock.now_s(), self._desk.prompt, paused=self._paused)
         self._drawn_s = time.monotonic()
 
     def _obey(self, action: Action) -> None:
@@ -196,6 +197,7 @@ class _LiveBench:
             self._clock.interrupt()
         elif action is Action.PAUSE:
             self._clock.pause()
+            self._paused = not self._paused
         elif action in DISTURBANCES:
             self._disturb(action)
         elif self._last is not None:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 import math
 import time
+from collections.abc import Mapping
 from typing import Any
 
+from thermoctl.app.live import numbers
 from thermoctl.signals import Cycle, Estimate
+from thermoctl.studies.words import duration
 
 SETTLED_K = 0.1
 SETTLED_FOR_S = 60.0
@@ -136,3 +139,46 @@ class Summary:
             "final_temperature_c": finite(self._temperature_c),
             "wall_s": round(time.monotonic() - self._wall_s, 3),
         }
+
+
+def closing_lines(figures: Mapping[str, Any]) -> list[str]:
+    """Return what a person wants to know of a run that has ended, in four lines.
+
+    Parameters
+    ----------
+    figures : mapping
+        As `Summary.as_dict` gives them.
+    """
+    steps = figures["steps"]
+    if not steps:
+        return ["Ran       no cycle was finished"]
+    took = f"{duration(figures['duration_s'])} simulated in {duration(figures['wall_s'])}"
+    missed = f", {figures['missed']:,} missed" if figures["missed"] else ""
+    final = numbers.temperature(figures["final_temperature_c"])
+    moved = numbers.number(figures["travel_per_min"], 1)
+    overshoot = f"overshoot {numbers.difference(figures['overshoot_k']).lstrip('+')}"
+    return [
+        f"Ran       {took}, {steps:,} cycles{missed}",
+        f"Settled   {_settled(figures)}, {overshoot}",
+        f"Held      {_held(figures)}",
+        f"Ended at  {final}; power moved {moved} full ranges a minute",
+    ]
+
+
+def _settled(figures: Mapping[str, Any]) -> str:
+    """Return when the set point in force was reached for good."""
+    settled_s = figures["settled_s"]
+    if settled_s is not None:
+        return f"after {duration(settled_s)}"
+    return f"never: not within ±{SETTLED_K:g} K of the set point for {SETTLED_FOR_S:g} s"
+
+
+def _held(figures: Mapping[str, Any]) -> str:
+    """Return how well it held after it had settled."""
+    if figures["deviation_mk"] is None:
+        return "not judged before it has settled"
+    deviation, largest = (
+        numbers.difference(1e-3 * figures[name]).lstrip("+")
+        for name in ("deviation_mk", "max_deviation_mk")
+    )
+    return f"the set point with an rms deviation of {deviation}, at most {largest}"

@@ -25,8 +25,21 @@ _QUALITY_WORDS = {
 
 
 def _speed(view: View) -> str:
+    """Return how fast simulated time goes; empty on a real plant."""
+    if not view.facts.simulated:
+        return ""
+    if view.paused:
+        return "SIM PAUSED"
     speed = view.facts.speed
     return "SIM max" if speed is None else f"SIM ×{speed:g}"
+
+
+def _mode(view: View) -> str:
+    """Return the mode, and the controller where it is the one that decides."""
+    if view.step is None:
+        return ""
+    mode = view.step.mode.value
+    return f"{mode} · {view.step.controller}" if view.steered else mode
 
 
 def _age(view: View) -> str:
@@ -53,8 +66,10 @@ def _told(view: View, look: Look, width: int) -> Text | None:
         return None
     bar = Role.RED_BAR if state in (State.LATCHED, State.SAFE) else Role.STALE_BAR
     words.append(f"heater {numbers.power(view.accepted_power)}" if heated else "heater off")
-    left = f"{view.facts.loop}   {' · '.join(words)}"
+    left = "   ".join(filter(None, (view.facts.loop, _speed(view), " · ".join(words))))
     right = f"{_age(view)}   {_clock(view)}"
+    if len(left) + len(right) >= width:
+        right = _clock(view)  # since when is said already
     return parted(look, [(left, bar)], [(right, bar)], width, ground=bar)
 
 
@@ -69,11 +84,10 @@ def state_row(view: View, look: Look, width: int) -> Text:
     if view.step is None:
         left += [("   waiting for the first sample", Role.TEXT)]
     else:
-        words = f" {view.step.mode.value} · {view.step.controller}"
         left += [
             ("   ", Role.PAGE),
             (view.step.state.value.upper(), Role.STRONG),
-            (words, Role.TEXT),
+            (f" {_mode(view)}", Role.TEXT),
         ]
     right = [(_age(view), Role.MUTE), ("   ", Role.PAGE), (_clock(view), Role.STRONG)]
     if sum(len(string) for string, _ in (*left, *right)) >= width:
@@ -86,16 +100,21 @@ def _worst(alarms: tuple[Alarm, ...], *, latched: bool) -> Alarm | None:
     return min(asked, key=lambda alarm: (alarm.priority, alarm.since_s), default=None)
 
 
-def why(view: View) -> str:
-    """Return why the heater is off and what is awaited; empty if obvious."""
+def why(view: View, room: int) -> str:
+    """Return why the heater is off and what is awaited; empty if obvious.
+
+    In little room the cause is cut, and what is awaited stays.
+    """
     step = view.step
     if step is None or step.state not in (State.LATCHED, State.SAFE):
         return ""
     latched = step.state is State.LATCHED
     alarm = _worst(step.alarms, latched=latched)
-    cause = f"{alarm.code}: {alarm.text}" if alarm else step.command.reason
-    waits = "a acknowledges" if latched else "returns by itself after good data"
-    return f"{cause} · {waits}"
+    cause = numbers.sentence(f"{alarm.code}: {alarm.text}" if alarm else step.command.reason)
+    waits = " · a acknowledges" if latched else " · returns by itself after good data"
+    if len(cause) + len(waits) > room:
+        cause = f"{cause[: max(0, room - len(waits) - 1)]}…"
+    return f"{cause}{waits}"
 
 
 def _alarms(view: View, width: int) -> list[Part]:
@@ -113,9 +132,11 @@ def _alarms(view: View, width: int) -> list[Part]:
 
 def values_row(view: View, look: Look, width: int) -> Text:
     """Return the second row: the values now, or why the heater is off."""
-    reason = why(view)
+    value = numbers.temperature(view.temperature_c)
+    reason = why(view, width - len(value) - len("  ■ "))
     if reason:
-        return fitted(look.text(("■ ", Role.RED), (reason, Role.RED)), width)
+        role = Role.MUTE if view.stale else Role.STRONG
+        return fitted(look.text((value, role), ("  ■ ", Role.RED), (reason, Role.RED)), width)
     step = view.step
     if step is None:
         return fitted(look.text((f"{numbers.UNKNOWN} no sample yet", Role.MUTE)), width)
@@ -127,7 +148,7 @@ def values_row(view: View, look: Look, width: int) -> Text:
         # A value that is old is quiet: it is not what the water has now.
         role = Role.MUTE if view.stale else Role.STRONG
         change = f"  {numbers.difference(view.deviation_k):>8}"
-        left = [(numbers.temperature(value_c), role), (change, Role.TEXT)]
+        left = [(value, role), (change, Role.TEXT)]
     left += [("    set ", Role.MUTE), (numbers.temperature(view.setpoint_c), Role.STRONG)]
     left += [("    power ", Role.MUTE)]
     if math.isnan(view.accepted_power):
@@ -152,13 +173,35 @@ def _holding(view: View, room: int) -> list[Part]:
 
 
 def one_line(view: View, look: Look, width: int) -> Text:
-    """Return all that a terminal too small for the charts gets."""
-    step = view.step
-    if step is None:
-        return fitted(look.text(("waiting for the first sample", Role.TEXT)), width)
-    words = [_clock(view), step.state.value.upper()]
-    words += ["STALE"] if view.stale else []
-    words += [why(view)] if why(view) else []
-    words += [numbers.temperature(view.temperature_c), numbers.difference(view.deviation_k)]
-    words += [f"set {numbers.temperature(view.setpoint_c)}", numbers.power(view.accepted_power)]
-    return fitted(look.text(("  ".join(words), Role.TEXT)), width)
+    """Return all that a terminal too small for the charts gets.
+
+    The way out stands at the right and is the last to go; a question that is open comes first.
+    """
+    step, leave = view.step, "  q quits"
+    room = width - len(leave) if width > 2 * len(leave) else width
+    if view.prompt:
+        words = [view.prompt]
+    elif step is None:
+        words = ["waiting for the first sample"]
+    else:
+        words = [_clock(view), f"{step.state.value.upper()} {step.mode.value}"]
+        words += ["PAUSED"] if view.paused else []
+        words += ["STALE"] if view.stale else []
+        words += [numbers.temperature(view.temperature_c)]
+        used = len("  ".join(words)) + 2
+        words += [why(view, room - used)] if why(view, room) else _steered_values(view)
+    left = look.text(("  ".join(words), Role.TEXT))
+    if room == width:
+        return fitted(left, width)
+    left.truncate(room, overflow="ellipsis" if look.utf8 else "crop", pad=True)
+    left.append_text(look.text((leave, Role.MUTE)))
+    return fitted(left, width)
+
+
+def _steered_values(view: View) -> list[str]:
+    """Return the deviation, the set point and the power, as words."""
+    return [
+        numbers.difference(view.deviation_k),
+        f"set {numbers.temperature(view.setpoint_c)}",
+        numbers.power(view.accepted_power),
+    ]

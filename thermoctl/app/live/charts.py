@@ -21,8 +21,8 @@ from thermoctl.app.live.scale import tick_for
 from thermoctl.app.live.sentences import Mark
 from thermoctl.quantities import Array
 
-LEFT, RIGHT = 7, 9
-"""Cells beside a plot: axis labels, and direct labels."""
+LEFT, RIGHT = 7, 10
+"""Cells beside a plot: axis labels, and direct labels of up to eight, such as −25.02 K."""
 
 DEVIATION_SCALE_MK = 100.0
 DEVIATION_BAND_MK = 30.0

@@ -50,7 +50,7 @@ class Desk:
     def press(self, action: Action, mode: Mode, setpoint_c: float) -> Request | None:
         """Return what `action` asks of a loop in `mode`; None when nothing yet.
 
-        Set points stay within the limits, on whole tenths.
+        Set points stay within the limits, on whole tenths; at a limit nothing more is asked.
         """
         if action is Action.MODE:
             return self._next(mode)
@@ -67,8 +67,8 @@ class Desk:
         # From what was asked last, so that quick strokes add up before the loop takes the first.
         asked_c = round(self._asked_c + step_k, 1)
         low_c, high_c = self._facts.setpoint_low_c, self._facts.setpoint_high_c
-        self._asked_c = clamp(asked_c, low_c, high_c)
-        return SetPoint(self._asked_c)
+        before_c, self._asked_c = self._asked_c, clamp(asked_c, low_c, high_c)
+        return None if self._asked_c == before_c else SetPoint(self._asked_c)
 
     def _next(self, mode: Mode) -> Mode | None:
         """Return Off, to act at once, or propose the mode that comes next."""

@@ -13,7 +13,7 @@ from thermoctl.app.live.scale import Scale, range_for
 from thermoctl.app.live.sentences import Sentence, sentence
 from thermoctl.app.live.trend import Trend, TrendRecorder
 from thermoctl.quantities import Array
-from thermoctl.signals import Beliefs, Cycle, Event, Quality, Step
+from thermoctl.signals import Beliefs, Cycle, Event, Mode, Quality, Step
 
 RECENT = 300
 """Samples that whiteness and tick time are judged on."""
@@ -23,6 +23,9 @@ FEWEST = 30
 
 DEVIATION_SAMPLES = 600
 """Samples the standard deviation is taken from: ten minutes at one a second."""
+
+STEERED = frozenset({Mode.AUTO, Mode.PROGRAM})
+"""Modes in which the controller decides the power, and its model is judged."""
 
 STALE_PERIODS = 3.0
 _EVENTS_KEPT = 200
@@ -114,7 +117,7 @@ class Recent:
     innovations : ndarray
         The last ones, oldest first, each in its own σ; NaN where a sample was not used.
     whiteness : Whiteness or None
-        None when it cannot be judged yet.
+        Of those innovations that were made while the law steered; None when it cannot be judged.
     deviation_sd_k, deviation_max_k : float
         Standard deviation, about the mean, and largest size of the deviation from the set point,
         over the last `DEVIATION_SAMPLES`.
@@ -145,6 +148,12 @@ class View:
     recent: Recent
     events: tuple[Sentence, ...]
     prompt: str = ""
+    paused: bool = False
+
+    @property
+    def steered(self) -> bool:
+        """Return whether the mode leaves the power to the controller."""
+        return self.step is not None and self.step.mode in STEERED
 
     @property
     def age_s(self) -> float:
@@ -211,6 +220,7 @@ class LiveModel:
         self._scale = Scale()
         self._range_s = 0.0
         self._innovations: deque[float] = deque(maxlen=RECENT)
+        self._judged: deque[float] = deque(maxlen=RECENT)
         self._ticks_us: deque[float] = deque(maxlen=RECENT)
         self._deviations_k: deque[float] = deque(maxlen=DEVIATION_SAMPLES)
         self._events: deque[Sentence] = deque(maxlen=_EVENTS_KEPT)
@@ -231,7 +241,9 @@ class LiveModel:
             self._first_s = step.t_s
         setpoint_c = _known(step.setpoint_c)
         deviation_k = temperature_c - setpoint_c
-        self._innovations.append(_in_sigma(step))
+        innovation = _in_sigma(step)
+        self._innovations.append(innovation)
+        self._judged.append(innovation if step.mode in STEERED else _NAN)
         self._deviations_k.append(deviation_k)
         self._ticks_us.append(_known(cycle.tick_us))
         self._scale.grow(temperature_c)
@@ -255,7 +267,7 @@ class LiveModel:
         """Take an event that came by another way than a step."""
         self._events.append(sentence(event))
 
-    def view(self, now_s: float, prompt: str = "") -> View:
+    def view(self, now_s: float, prompt: str = "", *, paused: bool = False) -> View:
         """Return what to show at loop time `now_s`, `prompt` in the row of keys."""
         cycle = self._cycle
         self._range_s = max(self._range_s, range_for(now_s - self._first_s))
@@ -271,6 +283,7 @@ class LiveModel:
             recent=self._recent(),
             events=tuple(self._events),
             prompt=prompt,
+            paused=paused,
         )
 
     def _recent(self) -> Recent:
@@ -283,7 +296,7 @@ class LiveModel:
         enough = deviations.size >= FEWEST
         return Recent(
             innovations=innovations,
-            whiteness=whiteness(innovations),
+            whiteness=whiteness(np.array(self._judged)),
             deviation_sd_k=float(deviations.std()) if enough else _NAN,
             deviation_max_k=float(np.abs(deviations).max()) if enough else _NAN,
             tick_us=self._ticks_us[-1] if self._ticks_us else _NAN,

@@ -7,6 +7,7 @@ that is not finite is unknown; it becomes `UNKNOWN` here and so never reaches a 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from datetime import datetime, timedelta
 
@@ -37,10 +38,14 @@ def temperature(value_c: float | None) -> str:
 
 
 def difference(value_k: float | None) -> str:
-    """Return a signed difference: in mK within ±0.1 K, in K beyond."""
+    """Return a signed difference: in mK within ±0.1 K, in K beyond.
+
+    From 100 K on it has one decimal, and so fits eight cells up to 1000 K.
+    """
     if value_k is not None and abs(value_k) <= 0.1:
         return with_unit(number(1e3 * value_k, 0, signed=True), "mK")
-    return with_unit(number(value_k, 2, signed=True), "K")
+    decimals = 2 if value_k is None or abs(value_k) < 99.995 else 1
+    return with_unit(number(value_k, decimals, signed=True), "K")
 
 
 def power(fraction: float | None) -> str:
@@ -78,6 +83,11 @@ def wall_time(zero: datetime, t_s: float, pattern: str = "%H:%M:%S") -> str:
         return UNKNOWN
 
 
+def sentence(words: str) -> str:
+    """Return `words` of a log, which write degC, with the sign that the screen uses."""
+    return re.sub(r"\s*\bdegC\b", f"{NBSP}°C", words)
+
+
 _BY_SUFFIX: tuple[tuple[str, Callable[[float], str]], ...] = (
     ("power", power),
     ("_c", temperature),
@@ -92,7 +102,7 @@ _BY_SUFFIX: tuple[tuple[str, Callable[[float], str]], ...] = (
 def quantity(name: str, value: object) -> str:
     """Return `value` as its `name` asks: ``_c`` in °C, ``_s`` in s, ``power`` in %."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        return str(value)
+        return sentence(str(value))
     for suffix, write in _BY_SUFFIX:
         if name.endswith(suffix):
             return write(float(value))

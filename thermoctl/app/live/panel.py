@@ -102,7 +102,9 @@ def _belief_items(view: View, look: Look, cells: int) -> list[Item]:
     holding = believed.holding_power
     digits = numbers.number(None if holding is None else 100.0 * holding, 0)
     if digits == numbers.UNKNOWN:
-        items.append(_unknown("To hold", "To hold", none))
+        # It was known: the model is there, but too vague at the set point of now.
+        before = bool(np.isfinite(view.trend.table[trend.HOLDING]).any())
+        items.append(_unknown("To hold", "To hold", "not at this set point" if before else none))
     else:
         spark = _spark(view, look, cells, trend.HOLDING, 0.05)
         items.append(Item("To hold", "To hold", digits, "", "%", spark, Role.BLUE))
@@ -145,8 +147,9 @@ def _health_items(view: View, look: Look, cells: int) -> list[Item]:
     """Return the right column."""
     recent = view.recent
     items = [_inflation_item(view, look, cells)]
-    if recent.whiteness is None:
-        reason = f"after {FEWEST} innovations"
+    if recent.whiteness is None or not view.steered:
+        idle = view.step is not None and not view.steered
+        reason = "judged in auto only" if idle else f"after {FEWEST} innovations"
         items.append(_unknown("Whiteness", "White", reason))
     else:
         value = numbers.number(recent.whiteness.autocorrelation, 2)
@@ -189,7 +192,7 @@ def _parts(item: Item, label_cells: int, cells: int, *, errors: bool) -> list[Pa
 def note(view: View) -> str:
     """Return what the rule above the panel says at its right."""
     white = view.recent.whiteness
-    if white is not None and white.verdict == "not white":
+    if view.steered and white is not None and white.verdict == "not white":
         return "± is 2σ · not white: model or noise is wrong"
     if view.step is not None and view.step.estimate.rejected:
         return "± is 2σ · last sample not used"

@@ -66,10 +66,14 @@ def _keys(view: View, look: Look, width: int) -> Text:
     if view.facts.simulated:
         keys += [("d", "cold" if tight else "cold water"), ("i", "ice")]
         keys += [("s", "stir" if tight else "stirrer")]
-    keys += [("a", "ack"), ("q", "quit")]
+    keys += [("a", "ack")]
+    if view.facts.simulated:
+        keys += [("space", "go on" if view.paused else "pause")]
+    keys += [("q", "quit")]
+    apart = " " if tight else "  "
     parts: list[Part] = []
     for key, words in keys:
-        parts += [(f" {key} ", Role.CHIP), (f" {words}  ", Role.MUTE)]
+        parts += [(f" {key} ", Role.CHIP), (f" {words}{apart}", Role.MUTE)]
     return fitted(look.text(*parts), width)
 
 

@@ -102,7 +102,9 @@ class LiveScreen:
             while self._taken:
                 signal.signal(*self._taken.popitem())
 
-    def draw(self, loop_s: float, prompt: str = "", *, at_once: bool = False) -> bool:
+    def draw(
+        self, loop_s: float, prompt: str = "", *, paused: bool = False, at_once: bool = False
+    ) -> bool:
         """Draw the model as of loop time `loop_s`; return whether it was time to.
 
         Parameters
@@ -111,6 +113,8 @@ class LiveScreen:
             Loop time now, in s; the age of the data is counted from it.
         prompt : str
             A question to show instead of the keys.
+        paused : bool
+            Whether simulated time stands still.
         at_once : bool
             Draw even when the last picture is younger than `FASTEST_S`.
         """
@@ -120,7 +124,7 @@ class LiveScreen:
         width, height = self._terminal_size()
         small = width < LEAST_WIDTH or height < LEAST_HEIGHT
         self._due_s = now_s + (SMALL_S if small else FASTEST_S)
-        rows = render(self._model.view(loop_s, prompt), width, height, self._look)
+        rows = render(self._model.view(loop_s, prompt, paused=paused), width, height, self._look)
         lines = [terminal_codes(row, self._look.colour) for row in rows]
         # Asking for the size at each picture notices a resize as soon as SIGWINCH would.
         if (width, height) != self._size:

@@ -137,7 +137,15 @@ def test_strokes_add_up_before_the_loop_takes_the_first(facts: Facts) -> None:
 def test_a_set_point_stays_within_its_limits(facts: Facts) -> None:
     desk = Desk(facts)
     assert desk.press(Action.SETPOINT_UP_MUCH, Mode.AUTO, 59.5) == SetPoint(60.0)
-    assert desk.press(Action.SETPOINT_DOWN_MUCH, Mode.AUTO, 5.0) == SetPoint(5.0)
+    assert desk.press(Action.SETPOINT_DOWN_MUCH, Mode.AUTO, 5.5) == SetPoint(5.0)
+
+
+def test_at_a_limit_nothing_is_asked_and_the_way_back_is_open(facts: Facts) -> None:
+    desk = Desk(facts)
+    assert desk.press(Action.SETPOINT_UP, Mode.AUTO, 60.0) is None
+    assert desk.press(Action.SETPOINT_DOWN, Mode.AUTO, 60.0) == SetPoint(59.9)
+    assert desk.press(Action.SETPOINT_UP, Mode.AUTO, 60.0) == SetPoint(60.0)  # 59.9 is on its way
+    assert desk.press(Action.SETPOINT_UP, Mode.AUTO, 60.0) is None
 
 
 def test_acknowledging_asks_for_all_alarms_and_a_disturbance_asks_the_loop_nothing(

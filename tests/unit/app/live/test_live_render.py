@@ -186,9 +186,72 @@ def test_a_latch_is_red_and_says_why_and_what_it_waits_for(
     first = render(sixty.view(60.0), 80, 24, look)[0]
     assert first.style == look.style(Role.RED_BAR)
     rows = texts(sixty.view(60.0), 80, 24)
-    assert "■ LATCHED · heater off" in rows[0]
+    assert rows[0].startswith("tank   SIM ×60   ■ LATCHED · heater off")
     assert "STALE" not in rows[0]
-    assert f"trip.over_temperature: {text} · a acknowledges" in rows[1]
+    assert rows[1].startswith(f"37.49 °C  ■ trip.over_temperature: {text} · a acknowledges")
+
+
+def test_what_a_latch_waits_for_is_said_after_the_longest_cause(
+    sixty: LiveModel, make_cycle: MakeCycle
+) -> None:
+    text = "expected 5 to 55 degC, got 66.10 degC in two samples out of three, one after the other"
+    alarm = Alarm("trip.over_temperature", 9, 1, 60.0, text, latched=True)
+    sixty.feed(make_cycle(60.0, 66.1, state=State.LATCHED, alarms=(alarm,), accepted_power=0.0))
+    row = texts(sixty.view(60.0), 80, 24)[1]
+    assert row.startswith("66.10 °C  ■ trip.over_temperature: expected 5 to 55 °C, got")
+    assert row.endswith("… · a acknowledges")
+
+
+def test_a_pause_is_said_in_the_first_row_and_its_key_is_listed(sixty: LiveModel) -> None:
+    for width, height in ((80, 24), (100, 30)):
+        rows = texts(sixty.view(59.0, paused=True), width, height)
+        assert "SIM PAUSED" in rows[0]
+        assert "×60" not in rows[0]
+        assert "space  go on" in rows[-1]
+        assert "space  pause" in texts(sixty.view(59.0), width, height)[-1]
+        assert "q  quit" in rows[-1]
+    assert "PAUSED" in texts(sixty.view(59.0, paused=True), 79, 1)[0]
+
+
+@pytest.mark.parametrize("mode", [Mode.OFF, Mode.MANUAL])
+def test_a_law_that_does_not_steer_is_neither_named_nor_judged(
+    sixty: LiveModel, make_cycle: MakeCycle, mode: Mode
+) -> None:
+    assert "not white" in "\n".join(texts(sixty.view(59.0)))  # the innovations keep their sign
+    sixty.feed(make_cycle(60.0, mode=mode))
+    rows = texts(sixty.view(60.0))
+    assert f"RUN {mode.value} " in rows[0]
+    assert "self-tuning-mv" not in rows[0]
+    assert "not white" not in "\n".join(rows)
+    assert "judged in auto only" in "\n".join(rows)
+
+
+def test_a_holding_power_that_was_known_is_not_known_at_this_set_point(
+    sixty: LiveModel, make_cycle: MakeCycle
+) -> None:
+    vague = Beliefs(0.04, 0.001, 0.9996, 0.0006, None)
+    sixty.feed(make_cycle(60.0, setpoint_c=55.0, beliefs=vague))
+    for size in ((80, 24), (100, 30)):
+        (row,) = (row for row in texts(sixty.view(60.0), *size) if row.startswith("To hold"))
+        assert "– not at this set point" in row
+
+
+def test_a_holding_power_that_was_never_known_is_not_known_yet(
+    model: LiveModel, make_cycle: MakeCycle
+) -> None:
+    model.feed(make_cycle(0.0, beliefs=Beliefs(0.04, 0.001, 0.9996, 0.0006, None)))
+    (row,) = (row for row in texts(model.view(0.0)) if row.startswith("To hold"))
+    assert "– not known yet" in row
+
+
+@pytest.mark.parametrize(
+    ("temperature_c", "said"), [(12.48, "−25.02 K"), (162.5, "+125.0 K"), (37.41, "−90 mK")]
+)
+def test_the_label_of_the_deviation_keeps_its_unit(
+    model: LiveModel, make_cycle: MakeCycle, temperature_c: float, said: str
+) -> None:
+    model.feed(make_cycle(0.0, temperature_c))
+    assert any(row.rstrip().endswith(said) for row in texts(model.view(0.0), 80, 24)[7:13])
 
 
 def test_latched_and_stale_are_both_said(sixty: LiveModel, make_cycle: MakeCycle) -> None:
@@ -280,8 +343,28 @@ def test_the_same_column_is_the_same_time_from_top_to_bottom(
 
 def test_a_terminal_too_small_gets_one_line_with_everything(sixty: LiveModel) -> None:
     rows = texts(sixty.view(59.0), 79, 10)
-    assert " ".join(rows[0].split()) == "14:00:59 RUN 37.49 °C −10 mK set 37.50 °C 23.1 %"
+    said = "14:00:59 RUN auto 37.49 °C −10 mK set 37.50 °C 23.1 % q quits"
+    assert " ".join(rows[0].split()) == said
     assert not "".join(rows[1:]).strip()
+
+
+@pytest.mark.parametrize("width", [20, 40, 79])
+def test_the_way_out_of_a_small_terminal_is_the_last_to_go(sixty: LiveModel, width: int) -> None:
+    assert texts(sixty.view(59.0), width, 1)[0].endswith("  q quits")
+
+
+def test_a_small_terminal_shows_the_open_question(sixty: LiveModel) -> None:
+    assert texts(sixty.view(59.0, "Enter: mode auto"), 60, 1)[0].startswith("Enter: mode auto")
+
+
+def test_a_small_terminal_shows_the_temperature_beside_a_trip(
+    sixty: LiveModel, make_cycle: MakeCycle
+) -> None:
+    alarm = Alarm("trip.over_temperature", 9, 1, 60.0, "x" * 90, latched=True)
+    sixty.feed(make_cycle(60.0, 66.1, state=State.LATCHED, alarms=(alarm,)))
+    row = texts(sixty.view(60.0), 79, 1)[0]
+    assert "LATCHED auto  66.10 °C  trip.over_" in row
+    assert row.endswith("a acknowledges  q quits")
 
 
 def test_an_open_question_takes_the_row_of_keys(sixty: LiveModel) -> None:

@@ -45,3 +45,8 @@ def test_no_field_can_bring_a_nan_or_a_template_into_a_sentence() -> None:
         fields = dict.fromkeys(("temperature_c", "after_c", "before_c", "late_s"), math.nan)
         said = sentence(Event(0.0, name, {**fields, "text": "{0} {x!r} %s"}))
         assert "nan" not in said.text.lower().replace("output nan", "")
+
+
+def test_a_temperature_in_words_of_a_log_wears_the_sign_of_the_screen() -> None:
+    said = sentence(Event(0.0, "request.refused", {"why": "expected 5 to 55 degC, got 60 degC."}))
+    assert said.text == "Refused: expected 5 to 55\u00a0°C, got 60\u00a0°C."
