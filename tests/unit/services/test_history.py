@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import json
 import math
+import os
+import re
+import threading
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -158,6 +162,43 @@ def test_a_failed_export_leaves_no_file(recorded, tmp_path):
     with pytest.raises(Unavailable, match=r"'kettle', but it holds 120 of .*mash.* from 2023-11"):
         export(recorded, out, loop="kettle")
     assert [entry.name for entry in tmp_path.iterdir()] == ["state"]
+
+
+def test_an_export_follows_a_link_and_leaves_it_one(recorded, tmp_path):
+    (tmp_path / "there").mkdir()
+    link, final = tmp_path / "x.csv", tmp_path / "there" / "y.csv"
+    link.symlink_to(final)
+    for _ in range(2):
+        assert export(recorded, link, loop="tank") == 60
+        assert link.is_symlink()
+        assert len(final.read_text().splitlines()) == 61
+    assert [entry.name for entry in final.parent.iterdir()] == ["y.csv"]
+
+
+def test_an_export_into_a_pipe_leaves_it_a_pipe(recorded, tmp_path):
+    pipe, lines = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: lines.extend(pipe.read_text().splitlines()))
+    reader.start()
+    export(recorded, pipe, loop="tank")
+    reader.join()
+    assert len(lines) == 61
+    assert pipe.is_fifo()
+
+
+@pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="needs a device that is full")
+def test_an_export_into_a_full_device_fails_by_its_name_and_leaves_it_a_device(recorded, tmp_path):
+    link = tmp_path / "x.csv"  # a rename would hit the link, not the device of this machine
+    link.symlink_to("/dev/full")
+    with pytest.raises(OSError, match=re.escape(str(link))) as caught:
+        export(recorded, link)
+    assert caught.value.errno == errno.ENOSPC
+    assert link.is_char_device()
+
+
+def test_an_export_into_a_folder_that_is_not_there_names_it(recorded, tmp_path):
+    with pytest.raises(FileNotFoundError, match="there is no folder .*no: '.*x.csv'"):
+        export(recorded, tmp_path / "no" / "x.csv")
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,9 @@ disturbs the recording nor needs memory for more than a few rows.
 from __future__ import annotations
 
 import csv
+import errno
 import json
+import os
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -126,7 +128,8 @@ def export(
 
     The first column, ``time_utc``, is ISO 8601 with its offset; the names carry the units; an
     empty cell is a value that was not known. A file is written beside its final name and renamed
-    when it is whole, so that a failed export leaves none behind.
+    when it is whole, so that a failed export leaves none behind; a link stays one, and what is no
+    file, such as a pipe or a device, is written to as it is.
 
     Raises
     ------
@@ -137,16 +140,36 @@ def export(
     OSError
         `out` cannot be written.
     """
+    which = _Range(loop, since, until)
     if not isinstance(out, Path):
-        return _export(path, out, _Range(loop, since, until))
-    partial = out.with_name(f".{out.name}.partial")
+        return _export(path, out, which)
     try:
-        with partial.open("w", newline="", encoding="utf-8") as stream:
-            count = _export(path, stream, _Range(loop, since, until))
-        partial.replace(out)
+        return _export_whole(path, out, which)
+    except OSError as error:  # of the file that was asked for, not of the one beside it
+        raise OSError(error.errno, error.strerror, str(out)) from error
+
+
+def _export_whole(path: Path, out: Path, which: _Range) -> int:
+    """Write to a file that is there once it is whole, or straight into what is none."""
+    if out.exists() and not out.is_file():
+        with out.open("w", newline="", encoding="utf-8") as stream:
+            return _export(path, stream, which)
+    final = Path(os.path.realpath(out))
+    if not final.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, f"there is no folder {final.parent}", str(out))
+    partial = final.with_name(f".{final.name}.partial")
+    try:
+        with open(partial, "w", newline="", encoding="utf-8", opener=_no_link) as stream:
+            count = _export(path, stream, which)
+        partial.replace(final)
     finally:
         partial.unlink(missing_ok=True)
     return count
+
+
+def _no_link(path: str, flags: int) -> int:
+    """Open a file of our own; a link that somebody laid there would lead to one of theirs."""
+    return os.open(path, flags | os.O_NOFOLLOW, 0o666)
 
 
 class _Range:
