@@ -5,6 +5,7 @@ The only place that knows which class stands behind a port, and where boards are
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -152,6 +153,10 @@ def wiring_errors(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
             text = f"expected one loop for output {output!r} of {used!r}, got {', '.join(names)}"
             yield ("loops", names[1], "actuator"), text
     for name, board in settings.boards.items():
+        dead_man_s = getattr(board, "dead_man_s", math.inf)
+        if dead_man_s <= max(periods):
+            text = f"{dead_man_s:g} would end before the next command, after {max(periods):g} s"
+            yield ("boards", name, "dead_man_s"), text
         driver = driver_of(board)
         if not driver.capabilities.dead_man and not settings.service.accept_no_dead_man:
             yield (

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from thermoctl.app.compose import loop_for, started_as
 from thermoctl.app.settings import Settings, load
+from thermoctl.app.tables import LoopTable, SensorTable
 from thermoctl.errors import ConfigError
+from thermoctl.quantities import clamp
 from thermoctl.runtime.clock import SimulatedClock
 from thermoctl.signals import Cycle, Mode
 from thermoctl_drivers.simulated import SimulatedSettings
+
+WATER_J_PER_LK = 4186.0  # heat of a litre of water, in J/K
+_STAND_IN_W = 1500.0
+_VOLUMES_L, _POWERS_W = (0.5, 200.0), (50.0, 5000.0)
 
 
 def bench_settings(
@@ -24,22 +30,24 @@ def bench_settings(
     Parameters
     ----------
     source : path or Settings, optional
-        A configuration; the aquarium of O21 when not given. A real board in it is replaced by a
-        tank behind the power stage that the loop's actuator law expects.
+        A configuration; the aquarium of O21 when not given. A real board in it is replaced by
+        one of `stand_ins`.
     seed : int, optional
         Seed of the simulation; that of the configuration when not given.
 
     Raises
     ------
     ConfigError
-        The configuration is bad, or a loop uses a channel that a simulated board does not have.
+        The configuration is bad, or cannot be simulated.
     """
     settings = source if isinstance(source, Settings) else load(source or default_profile())
-    boards = {name: _simulated(name, board, settings) for name, board in settings.boards.items()}
+    tanks = stand_ins(settings)
+    boards = {**settings.boards, **tanks}
     if seed is not None:
         boards = {name: board.model_copy(update={"seed": seed}) for name, board in boards.items()}
-    starts = {name: (Mode.AUTO, table.setpoint_c) for name, table in settings.loops.items()}
-    return started_as(settings.model_copy(update={"boards": boards}), starts)
+    loops = {name: _rewired(table, tanks) for name, table in settings.loops.items()}
+    starts = {name: (Mode.AUTO, table.setpoint_c) for name, table in loops.items()}
+    return started_as(settings.model_copy(update={"boards": boards, "loops": loops}), starts)
 
 
 def default_profile() -> Path:
@@ -81,15 +89,49 @@ def simulate(settings: Settings, duration_s: float, seed: int | None = None) -> 
         loop.shut_down()
 
 
-def _simulated(name: str, board: BaseModel, settings: Settings) -> SimulatedSettings:
-    if isinstance(board, SimulatedSettings):
-        return board
+def stand_ins(settings: Settings) -> dict[str, SimulatedSettings]:
+    """Return the tank that stands in for each real board, by the name of the board.
+
+    It heats as fast as the model of the board's loop says, whatever litres and watts are behind
+    that: 1,500 W in as much water as it takes.
+
+    Raises
+    ------
+    ConfigError
+        The loop wants a power stage that a simulated board does not have.
+    """
+    return {
+        name: _tank_for(name, settings, getattr(board, "mains_hz", 50.0))
+        for name, board in settings.boards.items()
+        if not isinstance(board, SimulatedSettings)
+    }
+
+
+def _tank_for(board: str, settings: Settings, mains_hz: float) -> SimulatedSettings:
     for loop, table in settings.loops.items():
-        if table.actuator is not None and table.actuator.board == name:
+        if table.actuator is not None and table.actuator.board == board:
+            litres = _STAND_IN_W / (WATER_J_PER_LK * table.model.gain_k_per_s)
+            volume_l = clamp(litres, *_VOLUMES_L)
+            heater_w = clamp(WATER_J_PER_LK * volume_l * table.model.gain_k_per_s, *_POWERS_W)
             try:
                 return SimulatedSettings(
-                    power_stage=table.actuator.law, mains_hz=getattr(board, "mains_hz", 50.0)
+                    volume_l=volume_l,
+                    heater_w=heater_w,
+                    bits=12,
+                    power_stage=table.actuator.law,
+                    mains_hz=mains_hz,
                 )
             except ValidationError as error:
                 raise ConfigError(f"loop {loop!r} cannot be simulated: {error}") from error
     return SimulatedSettings()
+
+
+def _rewired(table: LoopTable, tanks: Mapping[str, SimulatedSettings]) -> LoopTable:
+    """Return `table` with the sensor and the channels that a simulated board has."""
+    sensor, actuator = table.sensor, table.actuator
+    if sensor is not None and sensor.board in tanks:
+        reference_v = tanks[sensor.board].reference_v
+        sensor = SensorTable(board=sensor.board, curve="lm335", reference_v=reference_v)
+    if actuator is not None and actuator.board in tanks:
+        actuator = actuator.model_copy(update={"output": "heater"})
+    return table.model_copy(update={"sensor": sensor, "actuator": actuator})
