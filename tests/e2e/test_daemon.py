@@ -204,3 +204,18 @@ def test_a_bad_configuration_is_exit_78_with_file_line_and_key(tmp_path, text, t
     assert ended.returncode == 78
     assert re.search(told, ended.stderr), ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+def test_a_watchdog_shorter_than_two_periods_is_refused_before_anything_is_on(tmp_path):
+    config = tmp_path / "slow.toml"
+    config.write_text(AQUARIUM.read_text().replace("period_s = 1.0", "period_s = 2.0"))
+    ended = subprocess.run(
+        [sys.executable, "-m", "thermoctl", "run", "-c", str(config), "--state", str(tmp_path)],
+        env={**os.environ, "WATCHDOG_USEC": "3000000"},
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert ended.returncode == 78
+    assert "at least 4 s" in ended.stderr

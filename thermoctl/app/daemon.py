@@ -27,7 +27,7 @@ from thermoctl.services.history.writer import HistoryWriter
 from thermoctl.services.journal import Journal, sink_for
 from thermoctl.services.latches import LatchKeeper
 from thermoctl.services.lock import DaemonLock, device_lock_path
-from thermoctl.services.notify import Notifier
+from thermoctl.services.notify import Notifier, watchdog_interval_s
 from thermoctl.services.places import make_private, runtime_dir, state_dir
 from thermoctl.services.store import LatchStore
 from thermoctl.signals import Acknowledge, Cycle, Event, SetPoint
@@ -72,6 +72,7 @@ class Daemon:
     def __init__(self, files: Sequence[Path], state: Path | None = None) -> None:
         self._files = list(files) or default_files()
         settings = load_all(self._files)
+        _require_patient_watchdog(settings)
         self._settings = settings
         directory = make_private(state_for(settings, state))
         run_directory = make_private(runtime_dir())
@@ -233,6 +234,17 @@ class Daemon:
         self._journal.emit(event, loop)
         if self._history is not None:
             self._history.publish_event(event, loop)
+
+
+def _require_patient_watchdog(settings: Settings) -> None:
+    """Refuse a service manager that would kill us between two healthy cycles."""
+    patience_s = watchdog_interval_s()
+    for name, table in settings.loops.items():
+        if patience_s is not None and patience_s < 2.0 * table.period_s:
+            raise ConfigError(
+                f"loops.{name}.period_s: {table.period_s:g} needs WatchdogSec of at least "
+                f"{2.0 * table.period_s:g} s in the unit, got {patience_s:g} s"
+            )
 
 
 def _words(cycle: Cycle) -> str:
