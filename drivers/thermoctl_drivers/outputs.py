@@ -12,7 +12,7 @@ from thermoctl.quantities import clamp, is_finite_number
 
 
 def commanded(name: str, power: Any, valid_for_s: Any, longest_s: float) -> tuple[float, float]:
-    """Return `power` within [0, 1] and the time it holds within [0, `longest_s`], in s.
+    """Return `power` within [0, 1] and how long it holds, at most `longest_s`.
 
     NaN is a power that nobody could compute, and becomes 0. What is infinite or no number at all
     is a fault of whoever asked, and must not come out as full power.
