@@ -12,6 +12,7 @@ import click
 from thermoctl.app import plugins
 from thermoctl.app.compose import wiring_errors
 from thermoctl.app.document import BadConfiguration, Document
+from thermoctl.app.parts import reach_c, sensor_for
 from thermoctl.app.settings import settings_in
 from thermoctl.app.tables import SensorTable
 from thermoctl.app.toml_text import toml_value
@@ -19,10 +20,11 @@ from thermoctl.errors import Refused
 
 _WATER_J_PER_L_K = 4186.0
 _HEADROOM_K, _LEAST_HEADROOM_K = 20.0, 2.0
-_NEAR_BOILING_C = 95.0
+_NEAR_BOILING_C, _BOILING_C = 95.0, 100.0
 _CURVES = list(SensorTable.model_json_schema()["properties"]["curve"]["enum"])
 _RESISTIVE = ("pt100", "pt1000", "ntc")
 _POSITIVE = click.FloatRange(min=0.0, min_open=True)
+_WATER = click.FloatRange(max=_BOILING_C, max_open=True)
 _TAKEN = "expected a file that is not there yet, got {}; --force replaces it"
 
 
@@ -107,13 +109,12 @@ def _answers(interview: _Interview) -> Answers:
     sensor = ask("sensor", "Sensor", "lm335", click.Choice(_CURVES))
     pull_up_ohm = None
     if sensor in _RESISTIVE:
-        pull_up_ohm = ask("pull_up_ohm", "Resistor it is read with, in ohm", 10_000.0, _POSITIVE)
+        usual_ohm = 1_000.0 if sensor == "pt100" else 10_000.0
+        pull_up_ohm = ask("pull_up_ohm", "Resistor it is read with, in ohm", usual_ohm, _POSITIVE)
     volume_l = ask("volume_l", "Water in the tank, in litres", 8.0, _POSITIVE)
     heater_w = ask("heater_w", "Rated power of the heater, in W", 1500.0, _POSITIVE)
-    setpoint_c = ask("setpoint_c", "Temperature to hold, in degC", 37.5, float)
-    above = click.FloatRange(min=setpoint_c, min_open=True)
-    usual_c = max(min(setpoint_c + _HEADROOM_K, _NEAR_BOILING_C), setpoint_c + _LEAST_HEADROOM_K)
-    trip_c = ask("trip_above_c", "Heater off for good above, in degC", usual_c, above)
+    setpoint_c = ask("setpoint_c", "Temperature to hold, in degC", 37.5, _WATER)
+    trip_c = ask("trip_above_c", "Heater off for good above, in degC", *_trip(setpoint_c))
     mode = ask("mode", "Mode at the first start", "auto", click.Choice(["off", "auto"]))
     return Answers(
         kind=kind,
@@ -127,6 +128,14 @@ def _answers(interview: _Interview) -> Answers:
         mode=mode,
         accept_no_dead_man=bool(interview.ask("accept_no_dead_man", "", False)),
     )
+
+
+def _trip(setpoint_c: float) -> tuple[float, click.FloatRange]:
+    """Return the usual trip above a set point and what may be answered: water boils at 100."""
+    usual_c = max(min(setpoint_c + _HEADROOM_K, _NEAR_BOILING_C), setpoint_c + _LEAST_HEADROOM_K)
+    if setpoint_c >= _BOILING_C:  # given as an option: then it is no water
+        return usual_c, click.FloatRange(min=setpoint_c, min_open=True)
+    return min(usual_c, _BOILING_C), click.FloatRange(setpoint_c, _BOILING_C, min_open=True)
 
 
 def commented(answers: Answers) -> str:
@@ -166,7 +175,7 @@ def _loop_lines(answers: Answers) -> list[str]:
         "[loops.tank]",
         _line("setpoint_c", answers.setpoint_c, "degC to hold"),
         _line("trip_above_c", answers.trip_above_c, "heater off for good above this"),
-        _line("trip_below_c", min(0.0, answers.setpoint_c - _HEADROOM_K), "and below this"),
+        *_trip_below_lines(answers),
         _line("setpoint_max_c", answers.setpoint_max_c, "no set point above this is accepted"),
         _line("period_s", 1.0, "one sample, one power, once a second"),
         _line("mode", answers.mode, "at the first start: off, manual or auto"),
@@ -194,6 +203,16 @@ def _loop_lines(answers: Answers) -> list[str]:
         _line("R1", 1e-8, "lets the pole follow a loss that changes over minutes"),
         _line("R2", 0.1, "K^2; well above the noise, for the lag that the model does not have"),
     ]
+
+
+def _trip_below_lines(answers: Answers) -> list[str]:
+    """Return the lower trip, unless the sensor would call that a broken wire anyway."""
+    trip_below_c = min(0.0, answers.setpoint_c - _HEADROOM_K)
+    table = SensorTable.model_validate(
+        {"board": "daq", "curve": answers.sensor, "pull_up_ohm": answers.pull_up_ohm}
+    )
+    coldest_c, _ = reach_c(sensor_for(table))
+    return [_line("trip_below_c", trip_below_c, "and below this")] * (trip_below_c > coldest_c)
 
 
 def _service_lines(answers: Answers) -> list[str]:

@@ -23,6 +23,8 @@ from thermoctl.model.arx import Arx, KnownGain
 from thermoctl.ports import Controller, Estimator
 from thermoctl.regulator import Limits, Plan
 
+_ROOM_C = 25.0
+_HALVINGS = 50
 _ARX_EXCITATION_MIN = 0.1
 _ARX_GAIN_SHARE = 0.2
 """Guarded, a learnt gain is never taken for less than this share of the one that is given."""
@@ -50,9 +52,47 @@ def check_parts(table: LoopTable) -> None:
     """Build every part of a loop once; raise `BadOption` where that fails."""
     plan_for(table)
     if table.sensor is not None:
-        sensor_for(table.sensor)
+        _check_reach(table, sensor_for(table.sensor))
     if table.actuator is not None:
         law_for(table.actuator)
+
+
+def _check_reach(table: LoopTable, sensor: curves.Sensor) -> None:
+    """Refuse a trip or a set point that no reading could ever pass.
+
+    Beyond its ends a sensor counts as broken, so a trip out there would never act.
+    """
+    coldest_c, hottest_c = reach_c(sensor)
+    if not coldest_c < table.setpoint_c < hottest_c:
+        text = f"expected what the sensor can show, {coldest_c:.1f} to {hottest_c:.1f} °C"
+        raise BadOption(f"{text}, got {table.setpoint_c:g}", ("setpoint_c",))
+    if not table.trip_above_c < hottest_c:
+        text = f"expected less than the {hottest_c:.1f} °C that the sensor can show at most"
+        raise BadOption(f"{text}, got {table.trip_above_c:g}", ("trip_above_c",))
+    if "trip_below_c" in table.model_fields_set and not table.trip_below_c > coldest_c:
+        text = f"expected more than the {coldest_c:.1f} °C that the sensor shows at least"
+        raise BadOption(f"{text}, got {table.trip_below_c:g}", ("trip_below_c",))
+
+
+def reach_c(sensor: curves.Sensor) -> tuple[float, float]:
+    """Return the coldest and the hottest temperature that `sensor` can show, in degC."""
+    ends_c = [_last_shown_c(sensor, end) for end in (sensor.short_below, sensor.open_above)]
+    return min(ends_c), max(ends_c)
+
+
+def _last_shown_c(sensor: curves.Sensor, end: float) -> float:
+    """Return what is shown at fraction `end`, or where the curve stops on the way there."""
+    if math.isfinite(shown_c := sensor.temperature_c(end)):
+        return shown_c
+    room = sensor.fraction(_ROOM_C)  # on every curve, though not on every converter
+    shown, blind = min(max(room, sensor.short_below), sensor.open_above), end
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (shown + blind)
+        if math.isfinite(sensor.temperature_c(middle)):
+            shown = middle
+        else:
+            blind = middle
+    return sensor.temperature_c(shown)
 
 
 @contextlib.contextmanager

@@ -229,6 +229,25 @@ def test_a_trip_below_the_setpoint_is_asked_again():
     assert load(tomllib.loads(result.stdout)).loops["tank"].trip_above_c == 70.0
 
 
+def test_water_is_neither_held_nor_tripped_above_100_degrees():
+    answers = "simulated\nlm335\n8\n1500\n120\n60\n1500\n100\nauto\n"
+    result = CliRunner().invoke(cli, ["config", "new"], input=answers)
+    assert result.exit_code == 0, result.stderr
+    loop = load(tomllib.loads(result.stdout)).loops["tank"]
+    assert (loop.setpoint_c, loop.trip_above_c) == (60.0, 100.0)
+
+
+@pytest.mark.parametrize("setpoint_c", [-5.0, 37.5, 96.0, 99.5, 150.0])
+@pytest.mark.parametrize("sensor", ["lm335", "lm35", "tmp36", "pt100", "pt1000", "ntc", "linear"])
+def test_the_usual_answers_suit_every_sensor_that_can_show_the_setpoint(run, sensor, setpoint_c):
+    code, out, err = run("config", "new", "--yes", "--sensor", sensor, f"--setpoint-c={setpoint_c}")
+    cannot = (sensor in ("lm35", "linear") and setpoint_c < 10.0) or (sensor, setpoint_c) == (
+        "ntc",
+        150.0,
+    )
+    assert (code, out != "") == ((78, False) if cannot else (0, True)), err
+
+
 @pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "much"])
 @pytest.mark.parametrize("option", ["--volume-l", "--heater-w"])
 def test_a_size_that_is_none_is_refused(run, option, value):

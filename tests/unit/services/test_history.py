@@ -197,7 +197,7 @@ def test_an_export_into_a_full_device_fails_by_its_name_and_leaves_it_a_device(r
 
 
 def test_an_export_into_a_folder_that_is_not_there_names_it(recorded, tmp_path):
-    with pytest.raises(FileNotFoundError, match="there is no folder .*no: '.*x.csv'"):
+    with pytest.raises(FileNotFoundError, match=r"there is no folder .*no: '.*x\.csv'"):
         export(recorded, tmp_path / "no" / "x.csv")
 
 
