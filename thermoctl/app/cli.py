@@ -24,6 +24,7 @@ EXIT_FAILED, EXIT_USAGE, EXIT_UNAVAILABLE, EXIT_PERMISSION, EXIT_CONFIG = 1, 2, 
 
 _COMMANDS: Final = {
     "run": "thermoctl.app.service_commands:run",
+    "off": "thermoctl.app.off_command:off",
     "alarms": "thermoctl.app.service_commands:alarms",
     "history": "thermoctl.app.service_commands:history",
     "config": "thermoctl.app.config_commands:config",

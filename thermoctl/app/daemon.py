@@ -44,6 +44,14 @@ def state_for(settings: Settings, given: Path | None) -> Path:
     return given or (Path(configured) if configured else state_dir())
 
 
+def locks_of(settings: Settings, state: Path) -> list[DaemonLock]:
+    """Return the locks of whoever drives these boards: the state folder's and the ports'."""
+    run_directory = make_private(runtime_dir())
+    ports = [board.port for board in settings.boards.values() if hasattr(board, "port")]
+    devices = [DaemonLock(device_lock_path(run_directory, port)) for port in ports]
+    return [DaemonLock(state / "daemon.lock"), *devices]
+
+
 @dataclass(slots=True)
 class _Seen:
     """The last cycle of every loop, written by the loop's thread and read by the main one."""
@@ -75,16 +83,10 @@ class Daemon:
         _require_patient_watchdog(settings)
         self._settings = settings
         directory = make_private(state_for(settings, state))
-        run_directory = make_private(runtime_dir())
-        self._locks = [DaemonLock(directory / "daemon.lock")]
-        self._locks += [
-            DaemonLock(device_lock_path(run_directory, board.port))
-            for board in settings.boards.values()
-            if hasattr(board, "port")
-        ]
+        self._locks = locks_of(settings, directory)
         self._journal = Journal(sink_for())
         self._notifier = Notifier()
-        self._latches = LatchStore(directory, run_directory)
+        self._latches = LatchStore(directory, make_private(runtime_dir()))
         self._seen = _Seen()
         self._clock = MonotonicClock()
         self._history: HistoryWriter | None = None
