@@ -25,6 +25,10 @@ class Unavailable(ThermoctlError):  # noqa: N818
     """Something needed is not there; the message says what to install."""
 
 
+class NotPermitted(ThermoctlError):  # noqa: N818
+    """This user may not do what is needed; the message says what that is."""
+
+
 class DriverError(ThermoctlError):
     """A board did not do what it was asked."""
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from thermoctl.app import plugins
-from thermoctl.app.options import DURATION, config_option, json_option, state_option
+from thermoctl.app.options import DURATION, Commands, config_option, json_option, state_option
 from thermoctl.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ _GAP = "  "
 # -- what can be connected -------------------------------------------------------------------------
 
 
-@click.group(invoke_without_command=True)
+@click.group(cls=Commands, invoke_without_command=True)
 @json_option
 @click.pass_context
 def drivers(ctx: click.Context, as_json: bool) -> None:

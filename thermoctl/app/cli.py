@@ -7,20 +7,18 @@ called, so that the daemon starts quickly and stays small.
 from __future__ import annotations
 
 import importlib
-import json
 import math
 import os
 import sys
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import click
+from click.core import ParameterSource
 
 from thermoctl import __version__
-from thermoctl.app.options import DURATION, SPEED, state_option
-from thermoctl.errors import ConfigError, ThermoctlError, Unavailable
-
-EXIT_FAILED, EXIT_USAGE, EXIT_UNAVAILABLE, EXIT_PERMISSION, EXIT_CONFIG = 1, 2, 69, 77, 78
+from thermoctl.app.endings import EXPECTED, flush, prepare_streams, tell
+from thermoctl.app.options import DURATION, FILE, SPEED, Commands, examples, state_option
 
 _COMMANDS: Final = {
     "run": "thermoctl.app.service_commands:run",
@@ -36,7 +34,7 @@ _COMMANDS: Final = {
 }
 
 
-class _Lazy(click.Group):
+class _Lazy(Commands):
     """A group whose commands are imported when they are asked for."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -50,18 +48,32 @@ class _Lazy(click.Group):
         return command
 
 
-@click.group(cls=_Lazy, invoke_without_command=True)
+_EXAMPLES: Final = examples(
+    "thermoctl --sim",
+    "thermoctl --sim -c tank.toml --speed max --duration 1h --json",
+)
+
+
+@click.group(cls=_Lazy, invoke_without_command=True, epilog=_EXAMPLES)
 @click.version_option(__version__, prog_name="thermoctl")
-@click.option("--sim", is_flag=True, help="Bench test on a simulated tank; needs no hardware.")
+@click.option(
+    "--sim",
+    is_flag=True,
+    help="Bench test on a simulated tank; needs no hardware. 60 simulated seconds a second on a "
+    "terminal, else as fast as it goes.",
+)
 @click.option(
     "-c",
     "--config",
-    type=click.Path(path_type=Path),
+    type=FILE,
     metavar="FILE",
     help="With --sim: the configuration to try; the aquarium of Özbek (2021) if not given.",
 )
 @click.option(
-    "--speed", type=SPEED, default=None, metavar="X|max", help="Simulated seconds a second."
+    "--speed",
+    type=SPEED,
+    metavar="X|max",
+    help="With --sim: simulated seconds a second, up to 1e6.",
 )
 @click.option("--duration", type=DURATION, default=math.inf, help="End after this: 10m, 1h, ...")
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of the simulation.")
@@ -81,12 +93,12 @@ def cli(
     as_json: bool,
 ) -> None:
     """Hold a temperature; identify the plant online, with error bars."""
-    if ctx.invoked_subcommand is not None:
-        if sim:
-            raise click.UsageError("--sim stands alone, without a command")
-        return
+    if ctx.invoked_subcommand is not None and sim:
+        raise click.UsageError("expected --sim without a command", ctx)
     if not sim:
-        click.echo(ctx.get_help())
+        _refuse_options_of_sim(ctx)
+        if ctx.invoked_subcommand is None:
+            click.echo(ctx.get_help())
         return
     from thermoctl.app import bench
     from thermoctl.app import sim as simulation
@@ -102,48 +114,30 @@ def cli(
     bench.run_bench(settings, options)
 
 
-def exit_code_of(error: BaseException) -> int:
-    """Return the exit code that goes with an error."""
-    match error:
-        case ConfigError():
-            return EXIT_CONFIG
-        case Unavailable():
-            return EXIT_UNAVAILABLE
-        case PermissionError():
-            return EXIT_PERMISSION
-        case _:
-            return EXIT_FAILED
+def _refuse_options_of_sim(ctx: click.Context) -> None:
+    """Refuse what would be ignored: options before a command, and options without --sim."""
+    for option in ctx.command.params:
+        name = str(option.name)
+        if ctx.get_parameter_source(name) not in (None, ParameterSource.DEFAULT):
+            written = " or ".join(option.opts)
+            command = ctx.invoked_subcommand
+            behind = f"; those of {command} stand behind it" if command else ""
+            raise click.UsageError(f"expected {written} only with --sim{behind}", ctx)
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit; the entry point of the ``thermoctl`` command."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    prepare_streams()
     # Matrices of a few rows gain nothing from threads, which cost memory and disturb deadlines.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         result = cli.main(args=arguments, prog_name="thermoctl", standalone_mode=False)
         code = result if isinstance(result, int) else 0
-        sys.stdout.flush()
-    except click.ClickException as error:
-        error.show()
-        code = error.exit_code
-    except click.Abort:
-        click.echo("thermoctl: interrupted", err=True)
-        code = 130
-    except (ThermoctlError, OSError) as error:
-        code = exit_code_of(error)
-        _tell(error, code, arguments)
+        flush()
+    except EXPECTED as error:
+        code = tell(error, arguments)
     sys.exit(code)
-
-
-def _tell(error: BaseException, code: int, arguments: list[str]) -> None:
-    for line in str(error).splitlines() or [type(error).__name__]:
-        click.echo(f"thermoctl: {line}", err=True)
-    if "--json" in arguments:
-        told: dict[str, Any] = {"kind": type(error).__name__, "text": str(error), "exit_code": code}
-        if problems := getattr(error, "problems", ()):
-            told["problems"] = [problem.as_json() for problem in problems]
-        click.echo(json.dumps({"error": told}))
 
 
 if __name__ == "__main__":

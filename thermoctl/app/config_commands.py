@@ -10,13 +10,13 @@ import click
 from thermoctl.app.compose import wiring_errors
 from thermoctl.app.config_new import new
 from thermoctl.app.document import BadConfiguration, exposures, read_document
-from thermoctl.app.options import config_option, json_option
+from thermoctl.app.options import Commands, config_option, json_option
 from thermoctl.app.settings import Settings, default_files, load_all, settings_in
 from thermoctl.app.tables import LoopTable
 from thermoctl.app.toml_text import toml_text
 
 
-@click.group()
+@click.group(cls=Commands)
 def config() -> None:
     """Check, show, describe or begin a configuration."""
 

@@ -12,6 +12,7 @@ import click
 from thermoctl.app import plugins
 from thermoctl.app.compose import wiring_errors
 from thermoctl.app.document import BadConfiguration, Document
+from thermoctl.app.options import FILE, examples
 from thermoctl.app.parts import reach_c, sensor_for
 from thermoctl.app.settings import settings_in
 from thermoctl.app.tables import SensorTable
@@ -54,8 +55,13 @@ class Answers:
         return round(self.trip_above_c - 0.1 * (self.trip_above_c - self.setpoint_c), 2)
 
 
-@click.command()
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="File; stdout if not given.")
+@click.command(
+    epilog=examples(
+        "thermoctl config new -o tank.toml",
+        "thermoctl config new --yes --kind thermodaq --setpoint-c 40 --trip-above-c 55",
+    )
+)
+@click.option("-o", "--out", type=FILE, help="File; stdout if not given.")
 @click.option("--force", is_flag=True, help="Replace a file that is there.")
 @click.option("--yes", is_flag=True, help="Ask nothing: take the default where none is given.")
 @click.option("--kind", help="Kind of the board; `thermoctl drivers` lists them.")

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from thermoctl.app.toml_places import line_of, places
-from thermoctl.errors import ConfigError
+from thermoctl.errors import ConfigError, NotPermitted
 
 KeyPath = tuple[str, ...]
 
@@ -89,6 +89,8 @@ def read_document(files: Iterable[Path]) -> Document:
 
     Raises
     ------
+    NotPermitted
+        This user may not read a file.
     ConfigError
         A file cannot be read, is no TOML, repeats what an earlier one says, or is open to
         everybody while root reads it.
@@ -153,10 +155,11 @@ def _text(file: Path) -> str:
             return stream.read()
     except FileNotFoundError as error:
         raise ConfigError(f"{file}: no such file") from error
+    except PermissionError as error:
+        raise NotPermitted(f"{file}: expected the right to read it, got none") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(
-            f"{file}: expected a readable TOML file in UTF-8, got: {error}"
-        ) from error
+        got = getattr(error, "strerror", None) or error
+        raise ConfigError(f"{file}: expected a readable TOML file in UTF-8, got: {got}") from error
 
 
 def _parsed(file: Path, text: str) -> dict[str, Any]:

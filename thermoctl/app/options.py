@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import re
 from collections.abc import Callable
@@ -41,11 +42,34 @@ class Speed(click.ParamType):  # type: ignore[type-arg]
         except ValueError:
             speed = math.nan
         if not 0.0 < speed <= 1e6:
-            self.fail(f"expected a positive number or max, got {value!r}", param, ctx)
+            self.fail(f"expected a number above 0, up to 1e6, or max, got {value!r}", param, ctx)
         return speed
 
 
 DURATION, SPEED = Duration(), Speed()
+FILE = click.Path(path_type=Path, readable=False)
+"""A file that whoever reads it reports on; click would call a missing right wrong usage."""
+
+
+class Commands(click.Group):
+    """A group that lists its commands with their whole first sentence."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write one row for each command, none of them cut."""
+        rows = []
+        for name in self.list_commands(ctx):
+            command = self.get_command(ctx, name)
+            if command is not None and not command.hidden:
+                paragraph = inspect.cleandoc(command.help or "").split("\n\n")[0]
+                rows.append((name, " ".join(paragraph.split())))
+        if rows:
+            with formatter.section("Commands"):
+                formatter.write_dl(rows)
+
+
+def examples(*lines: str) -> str:
+    """Return the end of a help page: commands as they are typed, one a line."""
+    return "\n".join(("\b", "Examples:", *(f"  {line}" for line in lines)))
 
 
 def config_option(function: F) -> F:
@@ -55,7 +79,7 @@ def config_option(function: F) -> F:
         "--config",
         "configs",
         multiple=True,
-        type=click.Path(path_type=Path),
+        type=FILE,
         metavar="FILE",
         help="Configuration; /etc/thermoctl/*.toml when not given.",
     )(function)
@@ -65,7 +89,7 @@ def state_option(function: F) -> F:
     """Add ``--state DIR``."""
     return click.option(
         "--state",
-        type=click.Path(path_type=Path, file_okay=False),
+        type=click.Path(path_type=Path, file_okay=False, readable=False),
         metavar="DIR",
         help="Folder of what survives a restart; else $STATE_DIRECTORY, else the user's.",
     )(function)

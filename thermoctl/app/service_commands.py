@@ -11,7 +11,15 @@ from typing import Any
 
 import click
 
-from thermoctl.app.options import DURATION, config_option, json_option, state_option
+from thermoctl.app.options import (
+    DURATION,
+    FILE,
+    Commands,
+    config_option,
+    examples,
+    json_option,
+    state_option,
+)
 from thermoctl.app.settings import Settings, default_files, load_all
 from thermoctl.errors import Refused, Unavailable
 from thermoctl.services.lock import DaemonLock
@@ -22,7 +30,9 @@ SERVICE_STATE = Path("/var/lib/thermoctl")
 _ANSWER_S = 2.5
 
 
-@click.command()
+@click.command(
+    epilog=examples("thermoctl run", "thermoctl run -c tank.toml --state ./state"),
+)
 @config_option
 @state_option
 def run(configs: tuple[Path, ...], state: Path | None) -> int:
@@ -45,7 +55,7 @@ def _state_of_daemon(settings: Settings | None, given: Path | None) -> Path:
     return SERVICE_STATE if not usual.is_dir() and SERVICE_STATE.is_dir() else usual
 
 
-@click.group(invoke_without_command=True)
+@click.group(cls=Commands, invoke_without_command=True)
 @config_option
 @state_option
 @json_option
@@ -53,7 +63,10 @@ def _state_of_daemon(settings: Settings | None, given: Path | None) -> Path:
 def alarms(
     ctx: click.Context, configs: tuple[Path, ...], state: Path | None, as_json: bool
 ) -> None:
-    """List what is latched; `alarms ack` clears it."""
+    """List what is latched; `alarms ack` clears it.
+
+    Exits 0 whether or not something is latched; --json gives a list, empty when nothing is.
+    """
     if ctx.invoked_subcommand is not None:
         return
     settings = _settings(configs)
@@ -63,21 +76,22 @@ def alarms(
     elif not latches:
         click.echo("no loop is latched")
     for name, (latch, _) in latches.items() if not as_json else ():
-        click.echo(f"{name} : {latch.code} since {_since(latch)}: {latch.text}")
+        click.echo(f"{name} : {latch.code} since {_since(latch) or 'unknown'}: {latch.text}")
 
 
 @alarms.command()
 @config_option
 @state_option
 @click.option("--loop", metavar="NAME", help="Only this loop.")
-def ack(configs: tuple[Path, ...], state: Path | None, loop: str | None) -> None:
+@json_option
+def ack(configs: tuple[Path, ...], state: Path | None, loop: str | None, as_json: bool) -> None:
     """Acknowledge, and let a latched loop heat again once its cause is gone."""
     settings = _settings(configs)
     if loop is not None:
         settings.loop(loop)
     directory = _state_of_daemon(settings, state)
     latches = {n: v for n, v in _latches(settings, directory).items() if loop in (None, n)}
-    if not latches:
+    if not latches and not as_json:
         click.echo("no loop is latched", err=True)
     for name, (latch, store) in latches.items():
         store.clear(name)
@@ -85,11 +99,18 @@ def ack(configs: tuple[Path, ...], state: Path | None, loop: str | None) -> None
             raise Refused(
                 f"the daemon did not clear {latch.code} of {name}: its cause still stands"
             )
-        click.echo(f"{name} : {latch.code} acknowledged")
+        if not as_json:
+            click.echo(f"{name} : {latch.code} acknowledged")
+    if as_json:
+        rows = [_row(name, latch) for name, (latch, _) in latches.items()]
+        gone = {"active": False, "latched": False, "acknowledged": True}
+        click.echo(json.dumps([row | gone for row in rows]))
 
 
 def _latches(settings: Settings, directory: Path) -> dict[str, tuple[Latch, LatchStore]]:
     store = LatchStore(directory, runtime_dir())
+    for name in settings.loops:
+        store.check_readable(name)
     return {n: (latch, store) for n in settings.loops if (latch := store.load(n)) is not None}
 
 
@@ -130,7 +151,7 @@ def _since(latch: Latch) -> str | None:
     return datetime.fromtimestamp(latch.since_utc_s, UTC).isoformat(timespec="seconds")
 
 
-@click.group()
+@click.group(cls=Commands)
 def history() -> None:
     """What has been recorded."""
 
@@ -138,9 +159,11 @@ def history() -> None:
 @history.command()
 @config_option
 @state_option
-@click.option("--file", type=click.Path(path_type=Path), help="A history file, instead of -c.")
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="CSV file; stdout if not given.")
-@click.option("--since", metavar="AGE|TIME", help="24h, or a time with its zone, ISO 8601.")
+@click.option("--file", type=FILE, help="A history file, instead of -c.")
+@click.option("-o", "--out", type=FILE, help="CSV file; stdout if not given.")
+@click.option(
+    "--since", metavar="AGE|TIME", help="24h ago, or an ISO 8601 time; local without a zone."
+)
 @click.option("--until", metavar="AGE|TIME", help="As --since.")
 @click.option("--loop", metavar="NAME", help="Only this loop.")
 def export(

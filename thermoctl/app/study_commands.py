@@ -5,17 +5,19 @@ from __future__ import annotations
 import json
 import math
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 from rich.console import Console
+from rich.progress import Progress
 
-from thermoctl.app.options import DURATION
+from thermoctl.app.options import DURATION, FILE, Commands, examples
 from thermoctl.app.settings import load
 from thermoctl.app.sim import profile, simulate
 from thermoctl.model.arx import Arx
+from thermoctl.signals import Cycle
 from thermoctl.studies.csv_record import read_csv
 from thermoctl.studies.experiment import Run, measure, run_from_cycles
 from thermoctl.studies.experiment_figure import draw_experiment
@@ -28,9 +30,13 @@ from thermoctl.studies.present import (
     print_replay,
     replay_json,
 )
-from thermoctl.studies.record import Columns, Record, RecordError
+from thermoctl.studies.record import ColumnError, Columns, Record, RecordError
 from thermoctl.studies.replay import replay
 from thermoctl.studies.replay_figure import draw_replay
+from thermoctl.studies.words import duration
+
+LONGEST_S = 172_800.0
+"""Longest experiment: two days, half a minute of CPU time; all of it is held in memory."""
 
 PLAIN_WIDTH = 120
 """Columns of a table that goes into a file or a pipe."""
@@ -70,8 +76,22 @@ def _positive(text: str) -> float:
     return value
 
 
-@click.command("replay")
-@click.argument("file", type=click.Path(path_type=Path))
+def _bounded_duration(text: str) -> float:
+    """Return a duration in s that an experiment may take."""
+    duration_s = float(DURATION.convert(text, None, None))
+    if duration_s > LONGEST_S:
+        raise ValueError(f"expected at most {duration(LONGEST_S)}, got {text!r}")
+    return duration_s
+
+
+@click.command(
+    "replay",
+    epilog=examples(
+        "thermoctl replay history.sqlite --loop tank",
+        "thermoctl replay run.csv --order 1,1,1 --estimator ckf --estimator rls:0.99",
+    ),
+)
+@click.argument("file", type=FILE)
 @click.option("--time", "time_column", metavar="NAME", help="Column of the time, s or ISO 8601.")
 @click.option("--input", "input_column", metavar="NAME", help="Column of the applied input.")
 @click.option("--output", "output_column", metavar="NAME", help="Column of the temperature.")
@@ -137,7 +157,7 @@ def replay_command(
     record = _read(file, Columns(output_column, input_column, time_column), loop)
     result = replay(record, order, laws, R2=noise, P0=start_variance, keep_mean=keep_mean)
     if plot:
-        _draw(lambda: draw_replay(result, list(plot)))
+        _draw(plot, lambda: draw_replay(result, list(plot)))
     if as_json:
         _say(record.notes)
         _print_json(replay_json(result))
@@ -153,13 +173,15 @@ def _read(file: Path, wanted: Columns, loop: str | None) -> Record:
         if loop is not None:
             raise RecordError(f"{file}: expected a history of thermoctl for --loop, got other text")
         return read_csv(file, wanted)
+    except ColumnError as error:
+        raise click.UsageError(str(error)) from error
     except PermissionError:
         raise
     except OSError as error:
         raise RecordError(f"{file}: expected a readable file, got: {error.strerror}") from error
 
 
-@click.group("reproduce")
+@click.group("reproduce", cls=Commands)
 def reproduce() -> None:
     """Repeat published work with this program."""
 
@@ -177,10 +199,10 @@ def reproduce() -> None:
 @click.option(
     "--duration",
     "duration_s",
-    type=DURATION,
+    type=_Parsed("duration", _bounded_duration),
     default="30m",
     show_default=True,
-    help="Simulated time, such as 90s, 30m or 2h.",
+    help=f"Simulated time, such as 90s, 30m or 2h; at most {duration(LONGEST_S)}.",
 )
 @click.option(
     "--out",
@@ -205,7 +227,7 @@ def experiment_command(
     files = [out / f"{stem}{kind}" for kind in FORMATS]
     run = _simulated(reference_time_s, duration_s, seed)
     measures = measure(run)
-    _draw(lambda: draw_experiment(run, measures, title, files))
+    _draw(files, lambda: draw_experiment(run, measures, title, files))
     if as_json:
         conditions = {"tc_s": reference_time_s, "seed": seed, "duration_s": duration_s}
         _print_json(experiment_json(measures, conditions, files))
@@ -221,13 +243,27 @@ def _simulated(reference_time_s: float | None, duration_s: float, seed: int) -> 
             law = loop["controller"]
             law = {"kind": law} if isinstance(law, str) else law
             loop["controller"] = {**law, "reference_time_s": reference_time_s}
-    return run_from_cycles(simulate(load(content), duration_s, seed))
+    cycles = simulate(load(content), duration_s, seed)
+    return run_from_cycles(_with_progress(cycles, duration_s))
 
 
-def _draw(draw: Callable[[], Iterable[Path]]) -> None:
-    """Draw, and say on stderr what was written."""
+def _with_progress(cycles: Iterable[Cycle], duration_s: float) -> Iterator[Cycle]:
+    """Yield `cycles`; a terminal on stderr sees how far they are, and nothing is left of it."""
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("simulating", total=duration_s)
+        for cycle in cycles:
+            bar.update(task, completed=cycle.step.t_s)
+            yield cycle
+
+
+def _draw(files: Sequence[Path], draw: Callable[[], Iterable[Path]]) -> None:
+    """Draw, and say on stderr which folder was made and what was written."""
+    missing = dict.fromkeys(file.parent for file in files if not file.parent.exists())
     try:
-        _say(f"figure written to {path}" for path in draw())
+        written = list(draw())
+        _say(f"folder {folder} made" for folder in missing)
+        _say(f"figure written to {path}" for path in written)
     except PermissionError:
         raise
     except OSError as error:

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Final, Self
 from urllib.parse import quote
 
-from thermoctl.errors import Unavailable
+from thermoctl.errors import NotPermitted, Unavailable
 
 LONGEST: Final = 64
 
@@ -38,12 +38,18 @@ class DaemonLock:
         ------
         Unavailable
             Another process holds it, and the message names it; or the file cannot be made.
+        NotPermitted
+            This user may not make or open the file.
         """
         if self._descriptor is not None:
             return
         try:
             self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o640)
+        except PermissionError as error:
+            raise NotPermitted(
+                f"{self._path} should be a lock file that user {os.geteuid()} may open"
+            ) from error
         except OSError as error:
             raise Unavailable(f"{self._path} should be a lock file: {error.strerror}") from error
         try:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from thermoctl.errors import Unavailable
+from thermoctl.errors import NotPermitted, Unavailable
 
 PRIVATE: Final = 0o700
 NAME: Final = "thermoctl"
@@ -50,6 +50,8 @@ def make_private(directory: Path) -> Path:
     ------
     Unavailable
         It cannot be made, is no folder, belongs to somebody else, or others may write into it.
+    NotPermitted
+        This user may not make it, or not write into it.
     """
     try:
         directory.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
@@ -58,8 +60,12 @@ def make_private(directory: Path) -> Path:
         checked = [(directory, found)]
         if directory.parent.name == _temporary().name:
             checked.append((directory.parent, directory.parent.lstat()))
+    except PermissionError as error:
+        raise _not_permitted(directory) from error
     except OSError as error:
-        raise Unavailable(f"{directory} should be a folder to write into: {error}") from error
+        raise Unavailable(
+            f"{directory} should be a folder to write into: {error.strerror}"
+        ) from error
     for place, status in checked:
         if not stat.S_ISDIR(status.st_mode):
             raise Unavailable(f"{place} should be a folder, not a link or a file")
@@ -72,7 +78,16 @@ def make_private(directory: Path) -> Path:
                 f"{place} should not be writable by everybody, "
                 f"but has mode {stat.S_IMODE(status.st_mode):04o}"
             )
+    if not os.access(directory, os.W_OK | os.X_OK):
+        raise _not_permitted(directory)
     return directory
+
+
+def _not_permitted(directory: Path) -> NotPermitted:
+    return NotPermitted(
+        f"{directory} should be a folder that user {os.geteuid()} may write into; "
+        "run as its owner, or give --state DIR"
+    )
 
 
 def _first(listed: str) -> Path | None:

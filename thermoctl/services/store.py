@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
 
+from thermoctl.errors import NotPermitted
 from thermoctl.signals import Mode
 
 FORMAT: Final = 1
@@ -101,7 +102,7 @@ class StateStore:
         try:
             return Stored(document=self._validated(content))
         except (ValueError, RecursionError) as error:
-            return Stored(warning=f"{path} is ignored: {error}")
+            return Stored(warning=f"{path} cannot be understood: {error}")
 
     def remove(self, name: str) -> None:
         """Remove the document `name`, for good when this returns; none there is fine.
@@ -231,6 +232,23 @@ class LatchStore:
         """Return whether any folder holds a latch of `loop`."""
         return any(store.exists(_latch(loop)) for store in self._stores)
 
+    def check_readable(self, loop: str) -> None:
+        """Do nothing if this user may read the latch of `loop`.
+
+        A daemon takes a latch that it cannot read for one. For a person who merely may not look,
+        that answer would be wrong.
+
+        Raises
+        ------
+        NotPermitted
+            There may be a latch, and this user may not read it.
+        """
+        for store in self._stores:
+            folder, path = store.directory, store.path_of(_latch(loop))
+            hidden = folder.exists() and not os.access(folder, os.R_OK | os.X_OK)
+            if hidden or (store.exists(_latch(loop)) and not os.access(path, os.R_OK)):
+                raise NotPermitted(f"{path} should be readable for user {os.geteuid()}; try sudo")
+
 
 @dataclass(frozen=True, slots=True)
 class RunRecord:
@@ -298,10 +316,10 @@ def _run(loop: str) -> str:
 def _as_latch(stored: Stored) -> Latch:
     document = stored.document
     if document is None:
-        return Latch(UNREADABLE, f"expected the record of a latch: {stored.warning}")
+        return Latch(UNREADABLE, f"{stored.warning}; it counts as a latch")
     code, text, fault = document.get("code"), document.get("text"), document.get("fault")
     if not (isinstance(code, str) and isinstance(text, str)):
-        return Latch(UNREADABLE, "expected a code and a text in the record of a latch")
+        return Latch(UNREADABLE, "expected a code and a text; the record counts as a latch")
     try:
         since_utc_s = _finite(document, "since_utc_s")
     except ValueError:

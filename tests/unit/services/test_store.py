@@ -133,7 +133,7 @@ def test_a_run_record_that_cannot_be_read_is_ignored_with_a_warning(tmp_path, wa
     record, warning = RunStore(tmp_path, wall_clock).load("tank")
     assert record is None
     assert warning is not None
-    assert "run-tank.json is ignored" in warning
+    assert "run-tank.json cannot be understood: " in warning
 
 
 @pytest.mark.parametrize(

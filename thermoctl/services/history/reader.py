@@ -21,7 +21,7 @@ from typing import Any, Final, TextIO
 import numpy as np
 import numpy.typing as npt
 
-from thermoctl.errors import Unavailable
+from thermoctl.errors import NotPermitted, Unavailable
 from thermoctl.quantities import Array
 from thermoctl.services.history.schema import (
     APPLICATION_ID,
@@ -97,6 +97,8 @@ def read_history(
     ------
     Unavailable
         No such file, not a history, of a newer schema, damaged, or without such cycles.
+    NotPermitted
+        This user may not read it.
     ValueError
         A time without a zone, or an unknown column.
     """
@@ -133,7 +135,7 @@ def export(
 
     Raises
     ------
-    Unavailable
+    Unavailable, NotPermitted
         As `read_history`, and no file is written then.
     ValueError
         A time without a zone.
@@ -241,6 +243,8 @@ def _readable(path: Path) -> Iterator[sqlite3.Connection]:
     """Open the history read-only; every way it can fail becomes one sentence."""
     if not path.is_file():
         raise Unavailable(f"no history at {path}")
+    if not os.access(path, os.R_OK):
+        raise NotPermitted(f"{path} should be a history that user {os.geteuid()} may read")
     connection = None
     try:
         connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
