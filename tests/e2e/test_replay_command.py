@@ -69,6 +69,7 @@ def test_json_has_one_object_and_errors_beside_it(thermoctl, recording):
         "rms_error",
         "r2",
         "whiteness_p",
+        "whiteness_unknown",
         "theta",
         "theta_sd",
         "us_per_sample",
@@ -104,14 +105,43 @@ def test_a_figure_is_written_where_it_was_asked_for(thermoctl, recording, tmp_pa
     assert came.returncode == 0
     assert (tmp_path / "a.png").stat().st_size > 10_000
     assert (tmp_path / "b" / "a.svg").stat().st_size > 10_000
-    assert "figure written to a.png" in came.stderr
+    assert came.stderr.splitlines() == [
+        "thermoctl: folder b made",
+        "thermoctl: figure written to a.png",
+        "thermoctl: figure written to b/a.svg",
+    ]
+
+
+def test_a_figure_that_does_not_fit_on_the_disk_is_named(thermoctl, recording, tmp_path):
+    (tmp_path / "full.png").symlink_to("/dev/full")
+    came = thermoctl("replay", recording, *COLUMNS, "--plot", "full.png")
+    assert came.returncode == 1
+    assert "full.png: expected a place for a figure, got: No space left on device" in came.stderr
+
+
+def test_an_ascii_terminal_gets_the_tables_in_ascii(thermoctl, recording, monkeypatch):
+    monkeypatch.setenv("PYTHONIOENCODING", "ascii")
+    came = thermoctl("replay", recording, *COLUMNS)
+    assert (came.returncode, came.stderr) == (0, "")
+    assert "heater -> water_c" in came.stdout
+    assert "parameters +- 2s" in came.stdout
+
+
+@pytest.mark.parametrize("wild", ["1e308", "9e49", "-1e200"])
+def test_one_wild_value_ends_neither_in_a_traceback_nor_in_a_warning(thermoctl, recording, wild):
+    lines = recording.read_text().splitlines()
+    lines[100] = f"{lines[100].rpartition(',')[0]},{wild}"
+    recording.write_text("\n".join(lines))
+    came = thermoctl("replay", recording, *COLUMNS)
+    assert (came.returncode, came.stderr) == (0, "")
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
         (("nowhere.csv",), 1, "nowhere.csv: expected a readable file"),
-        (("run.csv", "--output", "water"), 1, "run.csv has time_s, heater, water_c"),
+        (("run.csv", "--output", "water"), 2, "run.csv has time_s, heater, water_c"),
+        (("run.csv",), 2, "(--output); run.csv has time_s, heater, water_c"),
         (("run.csv", *COLUMNS, "--loop", "tank"), 1, "expected a history"),
         (("run.csv", *COLUMNS, "--order", "2"), 2, "expected n,m,d such as 2,2,1; got '2'"),
         (("run.csv", *COLUMNS, "--estimator", "x"), 2, "expected an estimator such as ckf"),
@@ -174,3 +204,9 @@ def test_a_run_too_short_to_arrive_says_so(thermoctl):
     came = thermoctl("reproduce", "experiment", "--duration", "60s")
     assert came.returncode == 0
     assert "the run was too short" in came.stdout
+
+
+def test_an_experiment_that_would_take_for_ever_is_refused(thermoctl):
+    came = thermoctl("reproduce", "experiment", "--duration", "100000h")
+    assert came.returncode == 2
+    assert "expected at most 2 d, got '100000h'" in " ".join(came.stderr.split())

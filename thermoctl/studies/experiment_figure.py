@@ -138,14 +138,14 @@ def _write_words(run: Run, measures: Measures, axes: Any) -> None:
 def _warm_up_words(measures: Measures) -> str:
     """Return the score of the whole run."""
     if measures.warm_up_s is None or measures.overshoot_k is None:
-        return "set point not reached"
+        return "too short: set point not reached"
     return f"reached after {measures.warm_up_s:.0f} s, overshoot {measures.overshoot_k:.2f} K"
 
 
 def _regulation_words(measures: Measures) -> str:
     """Return the score of regulation."""
     if measures.bias_k is None or measures.deviation_k is None:
-        return ""
+        return "too short to judge regulation"
     if measures.cycle_k is None:
         return (
             f"sd {1e3 * measures.deviation_k:.0f} mK, bias {1e3 * measures.bias_k:+.0f} mK".replace(

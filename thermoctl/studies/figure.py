@@ -114,7 +114,7 @@ def save(figure: Any, path: Path) -> Path:
     ValueError
         If the suffix is neither.
     OSError
-        If it cannot be written.
+        If it cannot be written; it names the file.
     """
     kind = path.suffix.lower()
     if kind not in FORMATS:
@@ -122,7 +122,13 @@ def save(figure: Any, path: Path) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     # Without a date in it, the same run gives the same file.
     metadata = {"Date": None} if kind == ".svg" else {"Software": None}
-    figure.savefig(path, format=kind[1:], metadata=metadata)
+    try:
+        figure.savefig(path, format=kind[1:], metadata=metadata)
+    except OSError as error:
+        # A disk that is full is noticed while writing, when nobody remembers the name.
+        if error.filename is None:
+            error.filename = str(path)
+        raise
     return path
 
 

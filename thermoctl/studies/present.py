@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,15 @@ from thermoctl.studies.experiment import Measures
 from thermoctl.studies.laws import parameter_names
 from thermoctl.studies.record import Record
 from thermoctl.studies.replay import Replay
-from thermoctl.studies.words import duration, number, probability
+from thermoctl.studies.words import ascii_only, duration, is_utf8, number, probability
+
+_Spell = Callable[[str], str]
+"""Turns words into those that the console can show; before they are laid out in columns."""
+
+
+def _spell(console: Console) -> _Spell:
+    """Return how words are spelt on `console`."""
+    return str if is_utf8(console.encoding) else ascii_only
 
 
 def replay_json(result: Replay) -> dict[str, Any]:
@@ -60,13 +68,14 @@ def _finite(value: Any) -> Any:
 
 def print_replay(console: Console, result: Replay) -> None:
     """Print what was read, what was done to it, and how every law did."""
+    spell = _spell(console)
     for line in (*_about_record(result.record), *_about_conditions(result)):
-        console.print(line, style="none", markup=False, soft_wrap=True)
-    _print_table(console, _prediction_table(result))
-    _print_table(console, *_parameter_tables(result))
+        console.print(spell(line), style="none", markup=False, soft_wrap=True)
+    _print_table(console, _prediction_table(result, spell))
+    _print_table(console, *_parameter_tables(result, spell))
     console.print()
     for line in _warnings(result):
-        console.print(line, markup=False, soft_wrap=True)
+        console.print(spell(line), markup=False, soft_wrap=True)
 
 
 def _about_record(record: Record) -> list[str]:
@@ -96,25 +105,25 @@ def _about_conditions(result: Replay) -> list[str]:
     ]
 
 
-def _table(*headings: str) -> Table:
+def _table(spell: _Spell, *headings: str) -> Table:
     """Return an empty table: the first column words, the others figures."""
     table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0), header_style="bold")
     for place, heading in enumerate(headings):
-        table.add_column(heading, justify="right" if place else "left", no_wrap=True)
+        table.add_column(spell(heading), justify="right" if place else "left", no_wrap=True)
     return table
 
 
-def _prediction_table(result: Replay) -> Table:
+def _prediction_table(result: Replay, spell: _Spell) -> Table:
     """Return how well each law foresaw the output."""
-    table = _table("\nestimator", "\nrms error", "\nR²", "whiteness\np", "µs a\nsample")
+    table = _table(spell, "\nestimator", "\nrms error", "\nR²", "whiteness\np", "µs a\nsample")
     for score in result.scores:
-        table.add_row(
-            score.name,
+        figures = (
             _figure(score.rms_error, ".4f"),
             _figure(score.r2, ".5f"),
             probability(score.whiteness_p),
             _figure(score.us_per_sample, ".1f"),
         )
+        table.add_row(score.name, *map(spell, figures))
     return table
 
 
@@ -126,17 +135,17 @@ def _figure(value: float, form: str) -> str:
     return f"{value:{'.2e' if large else form}}".replace("-", "−")
 
 
-def _parameter_tables(result: Replay) -> tuple[Table, Table]:
+def _parameter_tables(result: Replay, spell: _Spell) -> tuple[Table, Table]:
     """Return the last parameters of each law: a row for each law, or one for each parameter."""
     names = parameter_names(result.conditions.order)
     cells = [
-        [number(value, sd) for value, sd in zip(score.theta, score.theta_sd, strict=True)]
+        [spell(number(value, sd)) for value, sd in zip(score.theta, score.theta_sd, strict=True)]
         for score in result.scores
     ]
-    wide = _table("parameters ± 2σ", *names)
+    wide = _table(spell, "parameters ± 2σ", *names)
     for score, row in zip(result.scores, cells, strict=True):
         wide.add_row(score.name, *row)
-    tall = _table("parameters ± 2σ", *(score.name for score in result.scores))
+    tall = _table(spell, "parameters ± 2σ", *(score.name for score in result.scores))
     for name, column in zip(names, zip(*cells, strict=True), strict=True):
         tall.add_row(name, *column)
     return wide, tall
@@ -168,16 +177,30 @@ def _warnings(result: Replay) -> list[str]:
     worse = [s.name for s in result.scores if s.r2 > 0.0 and s.rms_error > base]
     if worse:
         lines.append(f"Worse than the last value as prediction: {', '.join(worse)}.")
-    if not any(score.whiteness_p >= 0.05 for score in result.scores):
+    return lines + _whiteness_words(result)
+
+
+def _whiteness_words(result: Replay) -> list[str]:
+    """Return what the test for whiteness found fault with, and what it could not judge."""
+    lines = [
+        f"Whiteness unknown for {score.name}: {score.whiteness_unknown}."
+        for score in result.scores
+        if score.whiteness_unknown
+    ]
+    judged = [score for score in result.scores if not score.whiteness_unknown]
+    if judged and all(score.whiteness_p < 0.05 for score in judged):
+        whose = f" of {', '.join(score.name for score in judged)}" if lines else ""
         lines.append(
-            "No innovations are white (p < 0.05): the model or its order leaves something out."
+            f"No innovations{whose} are white (p < 0.05): the model or its order leaves something"
+            " out."
         )
     return lines
 
 
 def print_experiment(console: Console, title: str, measures: Measures) -> None:
     """Print the measures of an experiment, each with its unit."""
-    console.print(title, markup=False, soft_wrap=True)
+    spell = _spell(console)
+    console.print(spell(title), markup=False, soft_wrap=True)
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_header=False)
     table.add_column(no_wrap=True)
     table.add_column(justify="right", no_wrap=True)
@@ -188,7 +211,7 @@ def print_experiment(console: Console, title: str, measures: Measures) -> None:
         why, rows = "the run was too short", rows[: 1 if measures.warm_up_s is None else 2]
     for name, value, unit in rows:
         known = ("–", why) if value is None else (value.replace("-", "−"), unit)
-        table.add_row(name, *known)
+        table.add_row(name, *map(spell, known))
     console.print(table)
 
 

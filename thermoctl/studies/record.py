@@ -40,6 +40,10 @@ class RecordError(ThermoctlError, ValueError):
     """A record cannot be used; the message says what was expected and what came."""
 
 
+class ColumnError(RecordError):
+    """A column was not named, or is not there; the message says which ones are."""
+
+
 @dataclass(frozen=True, slots=True)
 class Columns:
     """Names of the three columns a replay needs; None: the obvious one."""
@@ -178,7 +182,7 @@ def choose_columns(
 
     Raises
     ------
-    RecordError
+    ColumnError
         If a column that was asked for, or an obvious one, is not there; it names those that are.
     """
     notes: list[str] = []
@@ -187,7 +191,7 @@ def choose_columns(
     def pick(role: str, name: str | None, obvious: Sequence[str]) -> str | None:
         if name is not None:
             if name not in header:
-                raise RecordError(f"expected a column {name!r} for the {role}; {there}")
+                raise ColumnError(f"expected a column {name!r} for the {role}; {there}")
             return name
         found = [column for word in obvious for column in header if column.lower() == word]
         if not found:
@@ -197,10 +201,10 @@ def choose_columns(
 
     output = pick("output", wanted.output, OUTPUT_NAMES)
     if output is None:
-        raise RecordError(f"expected the name of the output column (--output); {there}")
+        raise ColumnError(f"expected the name of the output column (--output); {there}")
     entry = pick("input", wanted.input, INPUT_NAMES)
     if entry is None:
-        raise RecordError(f"expected the name of the input column (--input); {there}")
+        raise ColumnError(f"expected the name of the input column (--input); {there}")
     time = pick("time", wanted.time, TIME_NAMES)
     if time is None:
         notes.append("no column is obviously the time: rows are taken as evenly spaced")

@@ -19,8 +19,8 @@ from thermoctl.estimation import RecursiveLeastSquares, start
 from thermoctl.model.arx import Arx
 from thermoctl.quantities import Array
 from thermoctl.studies.laws import LawSpec, prepare
-from thermoctl.studies.record import Record, RecordError
-from thermoctl.studies.whiteness import ljung_box
+from thermoctl.studies.record import LARGEST, Record, RecordError
+from thermoctl.studies.whiteness import FEWEST_SAMPLES, ljung_box
 
 NOISE_FORGETTING = 0.95
 """Forgetting factor of the first pass that estimates the noise."""
@@ -30,6 +30,9 @@ FEWEST_SCORED = 10
 
 TRACE_LENGTH = 2_000
 """Most estimates that are kept for drawing; a longer record keeps every k-th."""
+
+BEYOND = 10.0
+"""An error larger than this many ranges of the record shows a law that ran away."""
 
 _LEARNING = 20
 _LEARNING_SHARE = 0.1
@@ -84,15 +87,16 @@ class Score:
 
     `rms_error` is in the unit of the output; `r2` is the share of the output's variance that was
     foreseen, negative when a constant would have done better; `whiteness_p` is the p value of
-    `thermoctl.studies.whiteness.ljung_box`, NaN unless `r2` is positive; `theta` and `theta_sd`
-    are the last estimate and its standard deviation in the units of the record; `us_per_sample` is
-    the median time of an update.
+    `thermoctl.studies.whiteness.ljung_box`, NaN unless `r2` is positive, and `whiteness_unknown`
+    says why it is NaN, else None; `theta` and `theta_sd` are the last estimate and its
+    standard deviation in the units of the record; `us_per_sample` is the median time of an update.
     """
 
     name: str
     rms_error: float
     r2: float
     whiteness_p: float
+    whiteness_unknown: str | None
     theta: tuple[float, ...]
     theta_sd: tuple[float, ...]
     us_per_sample: float
@@ -111,6 +115,9 @@ class Trace:
         negative variance.
     innovation, innovation_sd : ndarray, shape (T,)
         One-step prediction errors and what the law expected of them; NaN where none was made.
+    gave_up : int or None
+        First sample that counts whose error is beyond `BEYOND` ranges of the record, or where P
+        holds a negative variance, of a law that foresaw nothing; what comes after is no estimate.
     """
 
     index: npt.NDArray[np.intp]
@@ -118,6 +125,7 @@ class Trace:
     theta_sd: Array
     innovation: Array
     innovation_sd: Array
+    gave_up: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,7 +220,7 @@ def _prepare(record: Record, order: Arx, P0: float, keep_mean: bool) -> tuple[_S
     """Centre and scale, and decide from where on predictions count."""
     y_centre, y_scale = (0.0, 1.0) if keep_mean else _centre_and_scale(record.y)
     u_centre, u_scale = (0.0, 1.0) if keep_mean else _centre_and_scale(record.u)
-    if not np.ptp(record.y) > 0.0:
+    if not _moves(record.y):
         raise RecordError(
             f"{record.source}: expected an output that changes,"
             f" {record.names.output} is {record.y[0]:g} throughout"
@@ -246,8 +254,12 @@ def _prepare(record: Record, order: Arx, P0: float, keep_mean: bool) -> tuple[_S
 
 def _centre_and_scale(values: Array) -> tuple[float, float]:
     """Return mean and standard deviation; scale 1 for what never changes."""
-    spread = float(np.std(values)) if np.ptp(values) > 0.0 else 1.0
-    return float(np.mean(values)), spread
+    return float(np.mean(values)), float(np.std(values)) if _moves(values) else 1.0
+
+
+def _moves(values: Array) -> bool:
+    """Return whether `values` change, and by enough for their squares to be numbers."""
+    return bool(np.ptp(values) > 0.0 and np.std(values) > 1.0 / LARGEST)
 
 
 def _noise(scaled: _Scaled, conditions: Conditions) -> float:
@@ -306,7 +318,20 @@ def _run(
         innovation * conditions.y_scale,
         np.sqrt(prepared.unit_variance * variance) * conditions.y_scale,
     )
-    return _score(spec.text, scaled, conditions, trace, float(np.median(seconds))), trace
+    score = _score(spec.text, scaled, conditions, trace, float(np.median(seconds)))
+    if not score.r2 > 0.0:
+        trace = replace(trace, gave_up=_gave_up(trace, scaled, conditions))
+    return score, trace
+
+
+def _gave_up(trace: Trace, scaled: _Scaled, conditions: Conditions) -> int | None:
+    """Return the first sample from which on a law that ran away is not worth looking at."""
+    reach = BEYOND * conditions.y_scale * float(np.ptp(scaled.y))
+    late = trace.index >= conditions.scored_from
+    lost = late & ~(np.isfinite(trace.theta) & np.isfinite(trace.theta_sd)).all(axis=1)
+    far = np.flatnonzero(np.abs(trace.innovation) > reach)
+    places = np.concatenate((trace.index[lost], far[far >= conditions.scored_from]))
+    return int(places.min()) if len(places) else None
 
 
 def _score(
@@ -323,12 +348,23 @@ def _score(
     r2 = 1.0 - mean_square / spread if spread > 0.0 else math.nan
     # One error that dwarfs all others looks white; whoever foresaw nothing gets no such praise.
     p = ljung_box(e / trace.innovation_sd[counted]).p if r2 > 0.0 else math.nan
+    unknown = None
+    if math.isnan(p):
+        unknown = "it foresaw nothing" if not r2 > 0.0 else _too_few(len(e))
     return Score(
         name=name,
         rms_error=math.sqrt(mean_square),
         r2=r2,
         whiteness_p=p,
+        whiteness_unknown=unknown,
         theta=tuple(trace.theta[-1].tolist()),
         theta_sd=tuple(trace.theta_sd[-1].tolist()),
         us_per_sample=1e6 * update_s,
     )
+
+
+def _too_few(count: int) -> str:
+    """Return why `count` innovations of a law that foresaw something were not tested."""
+    if count < FEWEST_SAMPLES:
+        return f"expected at least {FEWEST_SAMPLES} innovations, got {count}"
+    return "the innovations do not vary, or the law did not say how sure it was"

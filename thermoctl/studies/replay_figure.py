@@ -6,16 +6,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from thermoctl.quantities import Array
 from thermoctl.studies import figure as house
 from thermoctl.studies.laws import parameter_names
 from thermoctl.studies.record import GAP
-from thermoctl.studies.replay import Replay
+from thermoctl.studies.replay import Replay, Trace
 from thermoctl.studies.words import number, probability
 
 _RECORD_IN, _PARAMETER_IN, _INNOVATION_IN = (1.25, 0.6), 0.95, 0.8
 _TOP_IN, _BOTTOM_IN, _SPACE_IN = 0.45, 0.5, 0.33
+
+_BAND_SHARE = 0.9
+_BAND_ROOM = 2.0
+"""The band may take up to this many times the range of the estimates on either side."""
+
+_CALM_ROOM = 20.0
+"""The same where even the narrowest of the band needs more."""
+
+_TOLD_SHARE = 0.05
 
 
 def draw_replay(result: Replay, paths: list[Path]) -> list[Path]:
@@ -96,45 +106,106 @@ def _draw_parameter(result: Replay, place: int, name: str, panel: Any, unit_s: f
     """Draw one parameter by up to four laws, the first with its band."""
     drawn = list(zip(result.scores, result.traces, house.HUES, house.DASHES, strict=False))
     low, high = _scale(result, place)
-    ends = []
+    ends, clipped = [], 0.0
     for rank, (_, trace, hue, dash) in enumerate(drawn):
-        t = result.record.t_s[trace.index] / unit_s
+        kept = _before(trace, trace.index)
+        t, theta = result.record.t_s[trace.index[kept]] / unit_s, trace.theta[kept, place]
         if rank == 0:
-            spread = 2.0 * trace.theta_sd[:, place]
-            below, above = trace.theta[:, place] - spread, trace.theta[:, place] + spread
-            panel.fill_between(t, below, above, color=hue, alpha=0.2, linewidth=0)
-        t, theta = house.envelope(t, trace.theta[:, place])
-        panel.plot(t, theta, color=hue, linestyle=dash, zorder=3 - 0.1 * rank)
-        ends.append(float(np.clip(trace.theta[-1, place], low, high)))
+            spread = 2.0 * trace.theta_sd[kept, place]
+            panel.fill_between(t, theta - spread, theta + spread, color=hue, alpha=0.2, linewidth=0)
+            late = trace.index[kept] >= result.conditions.scored_from
+            clipped = _share((theta - spread < low) | (theta + spread > high), late)
+        panel.plot(*house.envelope(t, theta), color=hue, linestyle=dash, zorder=3 - 0.1 * rank)
+        _mark_end(result, trace, panel, unit_s, hue)
+        ends.append(float(np.clip(theta[-1], low, high)) if len(theta) else 0.5 * (low + high))
     apart = house.spread_out(ends, 0.15 * (high - low))
     for (score, _, hue, _), y in zip(drawn, apart, strict=True):
         house.label(panel, y, score.name, hue)
     panel.set_ylim(low, high)
     panel.set_ylabel(f"${name[0]}_{{{name[1:]}}}$")
     first = result.scores[0]
-    house.score(panel, f"{first.name} {number(first.theta[place], first.theta_sd[place])}")
+    words = f"{first.name} {number(first.theta[place], first.theta_sd[place])}"
+    if drawn[0][1].gave_up is not None:
+        words = f"{first.name} gave up"
+    elif clipped >= _TOLD_SHARE:
+        words += f" · band leaves the panel for {100 * clipped:.0f} % of the record"
+    house.score(panel, words)
+
+
+def _before(trace: Trace, index: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
+    """Return which samples lie before the law gave up, if it did."""
+    return index < (trace.gave_up if trace.gave_up is not None else np.inf)
+
+
+def _share(marked: npt.NDArray[np.bool_], among: npt.NDArray[np.bool_]) -> float:
+    """Return the share of samples `among` those looked at that are `marked`."""
+    return float(np.mean(marked[among])) if among.any() else 0.0
+
+
+def _mark_end(result: Replay, trace: Trace, panel: Any, unit_s: float, hue: str) -> None:
+    """Draw a line where a law gave up, and say so."""
+    if trace.gave_up is None:
+        return
+    t = result.record.t_s[trace.gave_up] / unit_s
+    panel.axvline(t, color=hue, linewidth=0.8, linestyle=(0, (1, 1.5)))
+    right = t > 0.75 * result.record.t_s[-1] / unit_s
+    panel.annotate(
+        "gave up here",
+        xy=(t, 0.98),
+        xycoords=panel.get_xaxis_transform(),
+        xytext=(-3 if right else 3, 0),
+        textcoords="offset points",
+        color=hue,
+        fontsize=7.0,
+        ha="right" if right else "left",
+        va="top",
+    )
 
 
 def _scale(result: Replay, place: int) -> tuple[float, float]:
-    """Return the limits of a parameter's panel; what the laws did while learning may leave it."""
-    ends = []
-    for rank, trace in enumerate(result.traces[: len(house.HUES)]):
-        late = trace.index >= result.conditions.scored_from
-        theta, sd = trace.theta[late, place], trace.theta_sd[late, place]
-        # The median: with an input that stands still the band is wider than any panel for a while.
-        known = sd[np.isfinite(sd)]
-        spread = 2.0 * float(np.median(known)) if rank == 0 and len(known) else 0.0
-        low, high = np.percentile(theta, (2, 98))
-        ends += [low - spread, high + spread, float(theta[-1])]
-    low, high = min(ends), max(ends)
+    """Return the limits of a parameter's panel: estimates first, then as much band as fits.
+
+    What the laws did while learning may leave it. The band of the first law is shown up to
+    `_BAND_SHARE` of the samples, unless that made the estimates' own movement invisible: with an
+    input that rests, a band is wider than anything it surrounds.
+    """
+    ends: list[float] = []
+    for trace in result.traces[: len(house.HUES)]:
+        late = (trace.index >= result.conditions.scored_from) & _before(trace, trace.index)
+        theta = trace.theta[late, place]
+        if len(theta):
+            ends += [*np.percentile(theta, (2, 98)), float(theta[-1])]
+    if not ends:
+        return -1.0, 1.0
+    low, high = _with_band(result, place, min(ends), max(ends))
     margin = 0.1 * (high - low) or 0.1 * abs(high) or 1.0
     return low - margin, high + margin
+
+
+def _with_band(result: Replay, place: int, low: float, high: float) -> tuple[float, float]:
+    """Return the limits of the estimates widened by what of the first law's band there is room for.
+
+    Where it is narrowest, a band is an estimate's due, however calm the estimate; the band of a law
+    that gave up is not.
+    """
+    first = result.traces[0]
+    late = (first.index >= result.conditions.scored_from) & np.isfinite(first.theta_sd[:, place])
+    if first.gave_up is not None or not late.any():
+        return low, high
+    theta, spread = first.theta[late, place], 2.0 * first.theta_sd[late, place]
+    reach = high - low
+    narrow = 4.0 * float(np.percentile(spread, 10))
+    room = max(_BAND_ROOM * reach, min(narrow, _CALM_ROOM * reach) if reach > 0.0 else narrow)
+    bottom = float(np.percentile(theta - spread, 100.0 * (1.0 - _BAND_SHARE)))
+    top = float(np.percentile(theta + spread, 100.0 * _BAND_SHARE))
+    return max(min(low, bottom), low - room), min(max(high, top), high + room)
 
 
 def _draw_innovations(result: Replay, place: int, panel: Any, unit_s: float) -> None:
     """Draw the innovations of one law over the band it expected them in."""
     score, trace = result.scores[place], result.traces[place]
-    from_here = np.arange(len(result.record.t_s)) >= result.conditions.scored_from
+    index = np.arange(len(result.record.t_s))
+    from_here = (index >= result.conditions.scored_from) & _before(trace, index)
     known = np.flatnonzero(np.isfinite(trace.innovation) & from_here)
     t, e, sd = (
         values[known]
@@ -142,8 +213,10 @@ def _draw_innovations(result: Replay, place: int, panel: Any, unit_s: float) -> 
     )
     house.label(panel, 0.0, score.name, house.TEXT)
     panel.set_ylabel("$e$")
+    _mark_end(result, trace, panel, unit_s, house.TEXT)
     if not len(e):
-        house.score(panel, "every sample was rejected")
+        gone = trace.gave_up is not None
+        house.score(panel, "gave up at once" if gone else "every sample was rejected")
         return
     outside = np.abs(e) > 2.0 * sd
     shown = _thinned(len(e))
@@ -166,5 +239,9 @@ def _thinned(length: int) -> Array:
 def _innovation_words(result: Replay, place: int, inside: float) -> str:
     """Return the score line of an innovation panel."""
     score = result.scores[place]
-    p = probability(score.whiteness_p)
-    return f"rms {score.rms_error:.4g} · {100 * inside:.0f} % inside ±2√S · whiteness p {p}"
+    if result.traces[place].gave_up is not None:
+        return f"rms {score.rms_error:.4g} · gave up: whiteness unknown"
+    head = f"rms {score.rms_error:.4g} · {100 * inside:.0f} % inside ±2√S"
+    if score.whiteness_unknown is not None:
+        return f"{head} · whiteness unknown: {score.whiteness_unknown}"
+    return f"{head} · whiteness p {probability(score.whiteness_p)}"

@@ -4,6 +4,36 @@ from __future__ import annotations
 
 import math
 
+_ASCII = str.maketrans(
+    {
+        "\N{NO-BREAK SPACE}": " ",
+        "\N{MINUS SIGN}": "-",
+        "–": "-",
+        "×": "x",
+        "±": "+-",
+        "σ": "s",
+        "λ": "lambda",
+        "µ": "u",
+        "°": "deg",
+        "·": ".",
+        "─": "-",
+        "┊": ":",
+        "╱": "/",
+        "△": "!",
+        "▲": "!",
+        "■": "#",
+        "◆": "*",
+        "▴": "^",
+        "▾": "v",
+        "↑": "up/",
+        "↓": "dn",
+        "…": "~",
+        "→": "->",
+        "√": "sqrt",
+        "²": "2",
+    }
+)
+
 
 def number(value: float, sd: float) -> str:
     """Return `value` ± two standard deviations with the decimals that ± deserves."""
@@ -33,3 +63,13 @@ def duration(seconds: float) -> str:
     parts = [(days, "d"), (hours, "h"), (minutes, "min"), (s, "s")]
     first = next(place for place, (count, _) in enumerate(parts) if count)
     return " ".join(f"{count} {unit}" for count, unit in parts[first : first + 2] if count)
+
+
+def is_utf8(encoding: str | None) -> bool:
+    """Return whether a stream of this `encoding` can show every sign."""
+    return (encoding or "").lower().replace("-", "") == "utf8"
+
+
+def ascii_only(text: str) -> str:
+    """Return `text` in ASCII: signs as words or look-alikes, else a question mark."""
+    return text.translate(_ASCII).encode("ascii", "replace").decode("ascii")

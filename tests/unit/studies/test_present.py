@@ -31,8 +31,12 @@ def result():
     return replay(record, Arx(2, 2, 1), [parse_law(word) for word in ("ckf", "nkf", "rls:0.98")])
 
 
-def printed(show, *what, width=120):
-    console = Console(file=io.StringIO(), width=width)
+class Ascii(io.StringIO):
+    encoding = "ascii"
+
+
+def printed(show, *what, width=120, file=io.StringIO):
+    console = Console(file=file(), width=width)
     show(console, *what)
     return console.file.getvalue()
 
@@ -83,6 +87,33 @@ def test_innovations_that_are_not_white_are_remarked_on(result, p, said):
     assert (
         "No innovations are white" in printed(print_replay, replace(result, scores=scores))
     ) == said
+
+
+def test_whiteness_that_could_not_be_judged_is_unknown_and_no_verdict(result):
+    unknown = {"whiteness_p": math.nan, "whiteness_unknown": "too few"}
+    scores = tuple(replace(score, **unknown) for score in result.scores)
+    text = printed(print_replay, replace(result, scores=scores))
+    assert text.count("Whiteness unknown for ") == 3
+    assert "Whiteness unknown for rls:0.98: too few." in text
+    assert "No innovations" not in text
+
+
+def test_a_verdict_is_of_those_laws_only_that_could_be_judged(result):
+    first, second, _ = result.scores
+    lost = replace(first, whiteness_p=math.nan, whiteness_unknown="it foresaw nothing")
+    coloured = replace(second, whiteness_p=0.01)
+    text = printed(print_replay, replace(result, scores=(lost, coloured)))
+    assert "No innovations of nkf are white (p < 0.05)" in text
+
+
+@pytest.mark.parametrize("width", [60, 120])
+def test_an_ascii_console_gets_ascii_in_straight_columns(result, width):
+    text = printed(print_replay, result, width=width, file=Ascii)
+    assert text.isascii()
+    assert "u -> y" in text
+    rows = text[text.index("parameters") :].split("\n\n")[0].splitlines()
+    assert len({len(row.rstrip()) for row in rows}) == 1
+    assert printed(print_experiment, "ä", Measures(bias_k=-0.01), file=Ascii).isascii()
 
 
 def test_measures_that_are_not_known_give_the_reason():

@@ -194,3 +194,33 @@ def test_a_record_that_is_too_short_is_refused_with_the_numbers():
 def test_variances_must_be_positive(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
         replay(recorded(samples=100), ORDER, [KALMAN], **wrong)
+
+
+@pytest.mark.parametrize("unit_y", [1e-200, 1e-160])
+def test_an_output_too_small_to_be_squared_is_refused(unit_y):
+    with pytest.raises(RecordError, match="expected an output that changes"):
+        replay(recorded(200, unit_y=unit_y), ORDER, [KALMAN])
+
+
+def test_too_few_innovations_are_no_verdict_and_the_reason_is_given():
+    score = only(replay(recorded(20), ORDER, [KALMAN]))
+    assert np.isnan(score.whiteness_p)
+    assert score.whiteness_unknown == "expected at least 20 innovations, got 17"
+    assert only(replay(recorded(200), ORDER, [KALMAN])).whiteness_unknown is None
+
+
+def test_a_law_that_ran_away_gave_up_where_it_first_lost_its_way():
+    rng = np.random.default_rng(4)
+    u, y = np.where(np.arange(2000) < 600, rng.choice((0.0, 1.0), 2000), 1.0), np.zeros(2000)
+    for t in range(1, 2000):
+        y[t] = 0.95 * y[t - 1] + u[t - 1] + 0.1 * rng.standard_normal()
+    record = Record("made", np.arange(2000.0), u, y, Columns("y", "u", "t"))
+    result = replay(record, Arx(2, 3, 1), [parse_law("vff:10"), KALMAN])
+    lost, kept = result.traces
+    sane = np.abs(lost.innovation) <= replay_module.BEYOND * np.ptp(y)
+    sane[lost.index[~np.isfinite(lost.theta_sd).all(axis=1)]] = False
+    assert 600 < lost.gave_up < 2000
+    assert sane[result.conditions.scored_from : lost.gave_up].all()
+    assert not sane[lost.gave_up]
+    assert result.scores[0].whiteness_unknown == "it foresaw nothing"
+    assert kept.gave_up is None

@@ -1,5 +1,6 @@
 import builtins
 import math
+import re
 
 import numpy as np
 import pytest
@@ -63,6 +64,60 @@ def test_a_replay_of_a_law_that_ran_away_can_be_drawn(tmp_path, law, second):
     result = replay(made_record(3000, u), Arx(2, 3, 1), laws)
     assert not result.scores[second].r2 > 0.0
     draw_replay(result, [tmp_path / "r.png"])
+
+
+@pytest.fixture
+def panels(monkeypatch):
+    """Every figure that is saved, with its words as words."""
+    drawn = []
+
+    def keep(figure, path):
+        drawn.append(figure)
+        return path
+
+    monkeypatch.setattr(house, "save", keep)
+    return drawn
+
+
+def words(panel):
+    titles = [panel.get_title(loc=place) for place in ("left", "center", "right")]
+    return " ".join([*titles, *(text.get_text() for text in panel.texts)])
+
+
+def test_a_law_that_gave_up_is_drawn_up_to_there_and_says_so(tmp_path, panels):
+    u = np.where(np.arange(3000) < 100, np.arange(3000) % 2, 1.0)
+    laws = [parse_law("vff:1,forgetting_min=0.5"), parse_law("nkf")]
+    result = replay(made_record(3000, u), Arx(2, 3, 1), laws)
+    draw_replay(result, [tmp_path / "r.png"])
+    (figure,) = panels
+    for panel in figure.axes[2:8]:
+        assert "gave up here" in words(panel)
+        assert max(map(abs, panel.get_ylim())) < 100.0
+        end = result.traces[0].gave_up
+        lines = [line for line in panel.lines if line.get_color() == house.BELIEF]
+        assert all(np.nanmax(line.get_xdata()) <= end for line in lines)
+    assert "gave up here" not in words(figure.axes[8])
+
+
+def test_a_band_wider_than_the_panel_leaves_the_estimate_visible_and_is_told(tmp_path, panels):
+    rng = np.random.default_rng(8)
+    u = np.where(np.arange(3000) < 1500, 0.0, rng.choice((0.0, 1.0), 3000))
+    result = replay(made_record(3000, u), Arx(1, 2, 1), [parse_law("nkf")])
+    draw_replay(result, [tmp_path / "r.png"])
+    panel, trace = panels[0].axes[4], result.traces[0]
+    low, high = panel.get_ylim()
+    late = trace.index >= result.conditions.scored_from
+    moved = np.ptp(trace.theta[late, 2])
+    assert moved < high - low < 10.0 * moved < np.median(trace.theta_sd[:, 2])
+    told = re.search(r"band leaves the panel for (\d+) % of the record", words(panel))
+    assert int(told[1]) == pytest.approx(50, abs=5)
+
+
+def test_a_run_too_short_to_judge_says_so_in_its_figure(tmp_path, panels):
+    run = made_run(samples=3)
+    draw_experiment(run, measure(run), "title", [tmp_path / "e.png"])
+    assert "too short: set point not reached" in words(panels[0].axes[0])
+    assert "too short to judge regulation" in words(panels[0].axes[1])
 
 
 def test_an_experiment_is_drawn_as_png_and_svg(tmp_path):

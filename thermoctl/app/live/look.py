@@ -13,6 +13,8 @@ from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 
+from thermoctl.studies.words import ascii_only, is_utf8
+
 
 class Role(Enum):
     """What a piece of the picture means; the look decides how that appears."""
@@ -89,33 +91,6 @@ _STYLES: Mapping[Colour, Mapping[Role, str]] = {
     },
 }
 
-_ASCII = str.maketrans(
-    {
-        "\N{NO-BREAK SPACE}": " ",
-        "\N{MINUS SIGN}": "-",
-        "–": "-",
-        "×": "x",
-        "±": "+-",
-        "σ": "s",
-        "λ": "lambda",
-        "µ": "u",
-        "°": "deg",
-        "·": ".",
-        "─": "-",
-        "┊": ":",
-        "╱": "/",
-        "△": "!",
-        "▲": "!",
-        "■": "#",
-        "◆": "*",
-        "▴": "^",
-        "▾": "v",
-        "↑": "up/",
-        "↓": "dn",
-        "…": "~",
-    }
-)
-
 
 _STYLE_BOOK = Console(quiet=True)  # only asked what a style means; it never prints
 
@@ -128,8 +103,7 @@ def _style(colour: Colour, role: Role) -> Style:
 def printable(string: str, *, utf8: bool) -> str:
     """Return `string` on one line without control characters, ASCII if need be."""
     if not utf8:
-        string = string.translate(_ASCII)
-        string = string.encode("ascii", "replace").decode("ascii")
+        string = ascii_only(string)
     if string.isprintable():
         return string
     return "".join(c if c.isprintable() or c == "\N{NO-BREAK SPACE}" else " " for c in string)
@@ -178,7 +152,7 @@ def look_for(encoding: str | None, environ: Mapping[str, str] | None = None) -> 
         ``NO_COLOR``, ``COLORTERM`` and ``TERM`` are read; the process environment by default.
     """
     environ = os.environ if environ is None else environ
-    utf8 = (encoding or "").lower().replace("-", "") == "utf8"
+    utf8 = is_utf8(encoding)
     if environ.get("NO_COLOR") or environ.get("TERM") == "dumb":
         return Look(Colour.NONE, utf8)
     rich_in_hues = environ.get("COLORTERM", "").lower() in {"truecolor", "24bit"}
