@@ -93,7 +93,7 @@ def test_a_law_that_gave_up_is_drawn_up_to_there_and_says_so(tmp_path, panels):
     for panel in figure.axes[2:8]:
         assert "gave up here" in words(panel)
         assert max(map(abs, panel.get_ylim())) < 100.0
-        end = result.traces[0].gave_up
+        end = result.traces[0].gave_up / house.time_unit(3000.0)[0]
         lines = [line for line in panel.lines if line.get_color() == house.BELIEF]
         assert all(np.nanmax(line.get_xdata()) <= end for line in lines)
     assert "gave up here" not in words(figure.axes[8])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from thermoctl.app.live.model import FEWEST, Facts, LiveModel, whiteness
-from thermoctl.signals import Cycle, Event, Quality
+from thermoctl.signals import Cycle, Event, Mode, Quality
 
 MakeCycle = Callable[..., Cycle]
 
@@ -127,3 +127,14 @@ def test_facts_that_make_no_sense_are_refused(
 ) -> None:
     with pytest.raises(ValueError, match=named):
         Facts("tank", period_s, low_c, high_c, datetime(2026, 3, 1))
+
+
+@pytest.mark.parametrize("mode", [Mode.OFF, Mode.MANUAL])
+def test_innovations_of_a_law_that_does_not_steer_are_not_judged(
+    model: LiveModel, make_cycle: MakeCycle, mode: Mode
+) -> None:
+    for k in range(100):
+        model.feed(make_cycle(float(k), mode=mode))
+    recent = model.view(99.0).recent
+    assert recent.whiteness is None
+    assert np.isfinite(recent.innovations).all()

@@ -257,6 +257,9 @@ def test_the_label_of_the_deviation_keeps_its_unit(
 def test_latched_and_stale_are_both_said(sixty: LiveModel, make_cycle: MakeCycle) -> None:
     sixty.feed(make_cycle(60.0, quality=Quality.OPEN, state=State.LATCHED, accepted_power=0.0))
     assert "LATCHED · STALE since 14:00:59" in texts(sixty.view(70.0))[0]
+    tight = texts(sixty.view(70.0), 80, 24)[0]
+    assert "LATCHED · STALE since 14:00:59 · heater off" in tight
+    assert tight.endswith("14:01:10")
 
 
 @pytest.mark.parametrize(

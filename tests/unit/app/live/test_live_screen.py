@@ -155,3 +155,8 @@ def test_hues_are_written_for_a_terminal_that_has_them_and_not_otherwise() -> No
     assert codes(Colour.TRUE) == "\x1b[38;2;109;181;242;48;2;18;21;23mx\x1b[0m"
     assert codes(Colour.ANSI) == "\x1b[34mx\x1b[0m"
     assert codes(Colour.NONE) == "x"
+
+
+def test_a_pause_reaches_the_screen(screen: LiveScreen, output: io.StringIO) -> None:
+    screen.draw(59.0, paused=True)
+    assert "SIM PAUSED" in output.getvalue()
