@@ -16,11 +16,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from thermoctl.app.toml_places import line_of, places
+from thermoctl.app.toml_places import line_of, places, written_at
 from thermoctl.errors import ConfigError, NotPermitted
 
 KeyPath = tuple[str, ...]
 
+_HINTS = (
+    (re.compile(r"=\s*[+-]?\d+,\d"), "write a decimal point, not a comma"),
+    (re.compile(r"=\s*[A-Za-z]"), "write true or false in small letters, and text in quotes"),
+)
 _AT_LINE = re.compile(r"\s*\(at line (?P<line>\d+), column (?P<column>\d+)\)")
 
 
@@ -79,8 +83,8 @@ class Document:
         """Return a problem with `key`, placed at the line of it or its nearest table."""
         for depth in range(len(key), 0, -1):
             for file, found in self.lines.items():
-                if key[:depth] in found:
-                    return Problem(file, line_of(found, key), key, text)
+                if (line := written_at(found, key[:depth])) is not None:
+                    return Problem(file, line, key, text)
         return Problem(self.name, None, key, text)
 
 
@@ -103,8 +107,8 @@ def read_document(files: Iterable[Path]) -> Document:
         found = lines[str(file)] = places(text)
         for key, value in _parsed(file, text).items():
             for path in _repeated(key, value, merged):
-                line = line_of(found, path)
-                problems.append(Problem(str(file), line, path, "stands in an earlier file as well"))
+                told = f"stands in {_earlier(lines, str(file), path)} as well"
+                problems.append(Problem(str(file), line_of(found, path), path, told))
             both_tables = isinstance(value, dict) and isinstance(merged.get(key), dict)
             merged[key] = {**merged[key], **value} if both_tables else value
     if problems:
@@ -143,6 +147,12 @@ def _repeated(key: str, value: Any, merged: Mapping[str, Any]) -> list[KeyPath]:
     return [(key,)]
 
 
+def _earlier(lines: Mapping[str, dict[KeyPath, int]], file: str, path: KeyPath) -> str:
+    """Return which other file says something at `path`."""
+    others = (name for name in lines if name != file and line_of(lines[name], path) is not None)
+    return next(others, "an earlier file")
+
+
 def _text(file: Path) -> str:
     try:
         with file.open(encoding="utf-8-sig") as stream:
@@ -172,5 +182,12 @@ def _parsed(file: Path, text: str) -> dict[str, Any]:
             words = f"{_AT_LINE.sub('', words)} in column {at['column']}"
         elif "at end of document" in words:
             line = max(1, len(text.splitlines()))
+        words += "" if line is None else _hint(text.splitlines()[line - 1 : line])
         problem = Problem(str(file), line, (), f"no valid TOML: {words}")
         raise BadConfiguration([problem]) from error
+
+
+def _hint(lines: Sequence[str]) -> str:
+    """Return what was probably meant by a line that is no TOML."""
+    found = (hint for line in lines for pattern, hint in _HINTS if pattern.search(line))
+    return "".join(f"; {hint}" for hint in list(found)[:1])

@@ -14,6 +14,8 @@ Seconds = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+FirstMode = Literal[Mode.OFF, Mode.MANUAL, Mode.AUTO]
+"""What a loop can start in; a program has to be loaded first."""
 
 
 class Table(BaseModel):
@@ -146,7 +148,7 @@ class LoopTable(Table):
     period_s: Annotated[float, Field(ge=0.05, le=3600.0)] = Field(
         1.0, description="Time between two samples."
     )
-    mode: Mode = Field(Mode.OFF, description="Mode at the first start: off, manual or auto.")
+    mode: FirstMode = Field(Mode.OFF, description="Mode at the first start: off, manual or auto.")
     resume: bool = Field(False, description="Go on after a restart; else a restarted loop is off.")
     power_max: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
         1.0, description="Most power ever given, as a fraction."
@@ -176,13 +178,6 @@ class LoopTable(Table):
     @classmethod
     def _a_kind_alone_is_a_controller(cls, value: Any) -> Any:
         return {"kind": value} if isinstance(value, str) else value
-
-    @field_validator("mode")
-    @classmethod
-    def _no_program_yet(cls, value: Mode) -> Mode:
-        if value is Mode.PROGRAM:
-            raise ValueError("expected off, manual or auto: a loop cannot start in a program")
-        return value
 
     @model_validator(mode="after")
     def _setpoint_within_limits_within_trips(self) -> Self:

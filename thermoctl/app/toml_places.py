@@ -39,10 +39,17 @@ def places(text: str) -> dict[Path, int]:
 def line_of(found: dict[Path, int], path: Path) -> int | None:
     """Return the line of `path`, or of the nearest table written around it."""
     while path:
-        if path in found:
-            return found[path]
+        if (line := written_at(found, path)) is not None:
+            return line
         path = path[:-1]
     return None
+
+
+def written_at(found: dict[Path, int], path: Path) -> int | None:
+    """Return the line of `path`, or of the first below it: `[a.b]` makes an `a`."""
+    if path in found:
+        return found[path]
+    return min((line for key, line in found.items() if key[: len(path)] == path), default=None)
 
 
 def _split(path: str) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, get_args, get_origin
@@ -16,6 +17,8 @@ from thermoctl.quantities import is_finite_number
 KeyPath = tuple[str, ...]
 
 _LONGEST = 60
+_MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")
+"""A member of an enumeration as Python shows it, and the word in it."""
 _EXPECTED = {
     "float_type": "a number",
     "float_parsing": "a number",
@@ -118,7 +121,7 @@ def _reason(error: Any, path: KeyPath, known: list[str]) -> str:
     if kind not in _EXPECTED:
         message = str(error["msg"])
         return f"{message[0].lower()}{message[1:]}, got {shown(value)}"
-    expected = _EXPECTED[kind].format(**error.get("ctx", {}))
+    expected = _MEMBER.sub(r"\1", _EXPECTED[kind].format(**error.get("ctx", {})))
     return f"expected {expected}, got {shown(value)}{quotes_hint(expected, value)}"
 
 

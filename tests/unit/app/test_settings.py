@@ -147,8 +147,8 @@ def test_a_setpoint_that_is_no_temperature_is_refused(minimal, value, came):
     ("keys", "told"),
     [
         ({"resume": 1}, "resume: expected true or false, got 1"),
-        ({"mode": "on"}, "mode: expected 'off', 'manual', 'auto' or 'program', got \"on\""),
-        ({"mode": "program"}, "mode: expected off, manual or auto"),
+        ({"mode": "on"}, "mode: expected 'off', 'manual' or 'auto', got \"on\""),
+        ({"mode": "program"}, "mode: expected 'off', 'manual' or 'auto', got"),
         ({"period_s": 0.0}, "period_s: expected at least 0.05, got 0.0"),
         ({"power_max": 1.5}, "power_max: expected at most 1, got 1.5"),
         ({"jump_k": 0}, "jump_k: expected a number above 0, got 0"),
@@ -275,6 +275,30 @@ def test_a_syntax_error_names_file_and_line(tmp_path, text, line, words):
     assert problem.startswith(f"{place}: {words}")
 
 
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        ("setpoint_c = 37,5", "; write a decimal point, not a comma"),
+        ("resume = True", "; write true or false in small letters, and text in quotes"),
+        ("mode = auto", "; write true or false in small letters, and text in quotes"),
+        ("setpoint_c = ", "Invalid value in column 14"),
+    ],
+)
+def test_a_usual_slip_of_syntax_brings_a_hint(tmp_path, line, hint):
+    path = tmp_path / "bad.toml"
+    path.write_text(f"[loops.tank]\n{line}\n")
+    [problem] = problems(path)
+    assert problem.startswith(f"{path}:2: no valid TOML: ")
+    assert problem.endswith(hint)
+
+
+def test_a_typo_in_the_first_part_of_a_table_has_the_line_of_that_table(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text(f'{WHOLE}\n\n[loop.tank.sensor]\nboard = "daq"\n')
+    line = path.read_text().splitlines().index("[loop.tank.sensor]") + 1
+    assert problems(path) == [f"{path}:{line}: loop: unknown key; did you mean 'loops'?"]
+
+
 def test_the_problems_travel_as_data(tmp_path):
     path = tmp_path / "bad.toml"
     path.write_text(WHOLE.replace("37.5", '"37.5"'))
@@ -312,10 +336,10 @@ def test_a_table_may_not_stand_in_two_files(tmp_path):
         (tmp_path / f"{name}.toml").write_text(WHOLE)
     with pytest.raises(ConfigError) as caught:
         load_all([tmp_path / "a.toml", tmp_path / "b.toml"])
-    second = tmp_path / "b.toml"
+    first, second = tmp_path / "a.toml", tmp_path / "b.toml"
     assert str(caught.value).splitlines() == [
-        f"{second}:1: boards.daq: stands in an earlier file as well",
-        f"{second}:4: loops.tank: stands in an earlier file as well",
+        f"{second}:1: boards.daq: stands in {first} as well",
+        f"{second}:4: loops.tank: stands in {first} as well",
     ]
 
 
