@@ -45,7 +45,7 @@ def state_for(settings: Settings, given: Path | None) -> Path:
 
 
 def locks_of(settings: Settings, state: Path) -> list[DaemonLock]:
-    """Return the locks of whoever drives these boards: the state folder's and the ports'."""
+    """Return the locks of who drives these boards: state folder and ports."""
     run_directory = make_private(runtime_dir())
     ports = [board.port for board in settings.boards.values() if hasattr(board, "port")]
     devices = [DaemonLock(device_lock_path(run_directory, port)) for port in ports]
