@@ -7,7 +7,7 @@ import math
 from rich.text import Text
 
 from thermoctl.app.live import numbers
-from thermoctl.app.live.look import Look, Role
+from thermoctl.app.live.look import Look, Role, printable
 from thermoctl.app.live.model import View
 from thermoctl.app.live.rows import Part, fitted, parted
 from thermoctl.signals import Alarm, Mode, Quality, State
@@ -100,7 +100,7 @@ def _worst(alarms: tuple[Alarm, ...], *, latched: bool) -> Alarm | None:
     return min(asked, key=lambda alarm: (alarm.priority, alarm.since_s), default=None)
 
 
-def why(view: View, room: int) -> str:
+def why(view: View, look: Look, room: int) -> str:
     """Return why the heater is off and what is awaited; empty if obvious.
 
     In little room the cause is cut, and what is awaited stays.
@@ -111,6 +111,7 @@ def why(view: View, room: int) -> str:
     latched = step.state is State.LATCHED
     alarm = _worst(step.alarms, latched=latched)
     cause = numbers.sentence(f"{alarm.code}: {alarm.text}" if alarm else step.command.reason)
+    cause = printable(cause, utf8=look.utf8)  # before it is cut: ASCII is longer
     waits = " · a acknowledges" if latched else " · returns by itself after good data"
     if len(cause) + len(waits) > room:
         cause = f"{cause[: max(0, room - len(waits) - 1)]}…"
@@ -132,8 +133,8 @@ def _alarms(view: View, width: int) -> list[Part]:
 
 def values_row(view: View, look: Look, width: int) -> Text:
     """Return the second row: the values now, or why the heater is off."""
-    value = numbers.temperature(view.temperature_c)
-    reason = why(view, width - len(value) - len("  ■ "))
+    value = printable(numbers.temperature(view.temperature_c), utf8=look.utf8)
+    reason = why(view, look, width - len(value) - len("  ■ "))
     if reason:
         role = Role.MUTE if view.stale else Role.STRONG
         return fitted(look.text((value, role), ("  ■ ", Role.RED), (reason, Role.RED)), width)
@@ -189,7 +190,8 @@ def one_line(view: View, look: Look, width: int) -> Text:
         words += ["STALE"] if view.stale else []
         words += [numbers.temperature(view.temperature_c)]
         used = len("  ".join(words)) + 2
-        words += [why(view, room - used)] if why(view, room) else _steered_values(view)
+        reason = why(view, look, room - used)
+        words += [reason] if reason else _steered_values(view)
     left = look.text(("  ".join(words), Role.TEXT))
     if room == width:
         return fitted(left, width)

@@ -200,6 +200,9 @@ def test_what_a_latch_waits_for_is_said_after_the_longest_cause(
     row = texts(sixty.view(60.0), 80, 24)[1]
     assert row.startswith("66.10 °C  ■ trip.over_temperature: expected 5 to 55 °C, got")
     assert row.endswith("… · a acknowledges")
+    plain = texts(sixty.view(60.0), 80, 24, Look(Colour.NONE, utf8=False))[1]
+    assert plain.startswith("66.10 degC  # trip.over_temperature: expected 5 to 55 degC, go")
+    assert plain.endswith("~ . a acknowledges")
 
 
 def test_a_pause_is_said_in_the_first_row_and_its_key_is_listed(sixty: LiveModel) -> None:
