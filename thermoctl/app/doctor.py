@@ -27,10 +27,11 @@ from thermoctl.app.daemon import state_for
 from thermoctl.app.document import exposures
 from thermoctl.app.parts import sensor_for
 from thermoctl.app.settings import ETC, Settings
-from thermoctl.errors import ConfigError, DriverError
+from thermoctl.errors import ConfigError, DriverError, NotPermitted
 from thermoctl.ports import Board, Clock
 from thermoctl.runtime.clock import MonotonicClock
-from thermoctl.services.places import state_dir
+from thermoctl.services.places import runtime_dir, state_dir
+from thermoctl.services.store import LatchStore
 from thermoctl.signals import Quality, RawSample
 
 OK, WARN, FAIL = "ok", "warn", "fail"
@@ -77,6 +78,7 @@ def examine(
     findings += _ports(settings)
     if settings is not None:
         findings += boards(settings, directory, clock or MonotonicClock())
+        findings += latches(settings, directory)
     return [*findings, state_folder(directory), *clocks(), service(UNIT_FOLDERS), *_extras()]
 
 
@@ -244,6 +246,21 @@ def state_folder(directory: Path) -> Finding:
         return Finding(FAIL, "state", text)
     made = "" if there == directory else ", made at the first start"
     return Finding(OK, "state", f"{directory} can be written{made}")
+
+
+def latches(settings: Settings, directory: Path) -> Iterator[Finding]:
+    """Yield a failure for every latched loop; a warning where one may not look."""
+    store = LatchStore(directory, runtime_dir())
+    for name in settings.loops:
+        try:
+            store.check_readable(name)
+        except NotPermitted as error:
+            yield Finding(WARN, "latch", str(error))
+            continue
+        latch = store.load(name)
+        if latch is not None:
+            remedy = "remove the cause, then: thermoctl alarms ack"
+            yield Finding(FAIL, "latch", f"loop {name}: {latch.code}, {latch.text}; {remedy}")
 
 
 def clocks() -> Iterator[Finding]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import grp
 import os
+import stat
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +16,9 @@ from thermoctl.services.lock import LONGEST, device_lock_path
 from thermoctl.services.places import runtime_dir
 
 SERVICE_RUN: Final = Path("/run/thermoctl")
+TERMINAL_DRIVERS: Final = Path("/proc/tty/drivers")
+SERIAL_GROUPS: Final = ("dialout", "uucp", "plugdev")
+"""Groups that exist to give the right to ports; any other may give much more, root above all."""
 
 
 def present() -> list[str]:
@@ -31,6 +35,8 @@ def obstacle(port: str) -> str | None:
         return None
     if not os.path.exists(port):
         return f"{port} is not there; plug the board in, or set port to one of the ports above"
+    if not is_terminal(port):
+        return f"{port} is no serial port; set port to one of the ports above"
     if not os.access(port, os.R_OK | os.W_OK):
         return f"{port}: no right to read and write; {_remedy(port)}"
     for directory in (runtime_dir(), SERVICE_RUN):
@@ -64,16 +70,39 @@ def holder_of(lock: Path) -> str | None:
     return None
 
 
-def _remedy(port: str) -> str:
-    """Return what gives the right to use a port."""
-    group = os.stat(port).st_gid
+def is_terminal(port: str) -> bool:
+    """Return whether `port` is a terminal, as every serial port is; opens nothing.
+
+    Opening one would reset an Arduino. The kernel lists every terminal driver, and so its numbers.
+    """
+    status = os.stat(port)
+    if not stat.S_ISCHR(status.st_mode):
+        return False
+    major, minor = os.major(status.st_rdev), os.minor(status.st_rdev)
     try:
-        name = grp.getgrgid(group).gr_name
+        rows = TERMINAL_DRIVERS.read_text().splitlines()
+    except OSError:
+        return True  # nobody can tell; who opens it will
+    return not rows or any(_drives(row.split(), major, minor) for row in rows)
+
+
+def _drives(row: list[str], major: int, minor: int) -> bool:
+    """Return whether a row of the kernel's list of terminal drivers has these numbers."""
+    first, _, last = row[-2].partition("-")
+    return int(row[-3]) == major and int(first) <= minor <= int(last or first)
+
+
+def _remedy(port: str) -> str:
+    """Return what gives the right to use a port; never to join a group with more rights."""
+    status = os.stat(port)
+    try:
+        name = grp.getgrgid(status.st_gid).gr_name
     except KeyError:
-        name = str(group)
-    if group in os.getgroups():
-        return f"its group {name} has none either; install the udev rule"
-    return f"join its group and log in again: sudo usermod -aG {name} $USER"
+        name = str(status.st_gid)
+    if name in SERIAL_GROUPS and status.st_gid not in os.getgroups():
+        return f"join its group and log in again: sudo usermod -aG {name} $USER"
+    mode = stat.S_IMODE(status.st_mode)
+    return f"it is of user {status.st_uid} and group {name}, mode {mode:04o}; install the udev rule"
 
 
 def used_by(port: str) -> str | None:

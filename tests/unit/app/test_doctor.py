@@ -12,10 +12,23 @@ import pytest
 
 from thermoctl.app import serial_ports
 from thermoctl.app.cli import main
-from thermoctl.app.doctor import FAIL, OK, WARN, boards, examine, service, state_folder, wall_clock
+from thermoctl.app.compose import board_builder
+from thermoctl.app.doctor import (
+    FAIL,
+    OK,
+    WARN,
+    boards,
+    examine,
+    latches,
+    service,
+    state_folder,
+    wall_clock,
+)
 from thermoctl.app.settings import load
+from thermoctl.errors import LinkError
 from thermoctl.runtime.clock import SimulatedClock
 from thermoctl.services.lock import DaemonLock, device_lock_path
+from thermoctl.services.store import Latch, LatchStore
 
 PATIENCE_S = 0.2
 
@@ -108,14 +121,27 @@ def test_a_port_that_is_not_there_is_an_obstacle(tmp_path):
     assert "is not there; plug the board in" in (serial_ports.obstacle(str(tmp_path / "no")) or "")
 
 
-def test_a_port_without_rights_names_the_group_to_join(tmp_path):
+def test_what_is_no_terminal_is_no_serial_port(pty, tmp_path):
+    (tmp_path / "port").touch()
+    for port in ("/dev/null", str(tmp_path), str(tmp_path / "port")):
+        assert serial_ports.obstacle(port) == (
+            f"{port} is no serial port; set port to one of the ports above"
+        )
+    assert serial_ports.is_terminal(pty)
+
+
+@pytest.mark.parametrize("group", [0, 12345])
+def test_nobody_is_told_to_join_a_group_that_is_not_for_ports(tmp_path, group):
     port = tmp_path / "port"
     port.touch()
-    port.chmod(0o000)
-    if os.geteuid() == 0:
-        assert serial_ports.obstacle(str(port)) is None  # root needs no right
-    else:
-        assert "no right to read and write" in (serial_ports.obstacle(str(port)) or "")
+    port.chmod(0o640)
+    try:
+        os.chown(port, -1, group)
+    except PermissionError:
+        pytest.skip("only root may give a file to another group")
+    remedy = serial_ports._remedy(str(port))
+    assert "usermod" not in remedy
+    assert remedy.endswith("mode 0640; install the udev rule")
 
 
 def test_a_port_that_a_daemon_has_locked_names_its_process(pty, tmp_path, monkeypatch):
@@ -124,6 +150,17 @@ def test_a_port_that_a_daemon_has_locked_names_its_process(pty, tmp_path, monkey
         told = serial_ports.obstacle(pty)
     assert told == f"{pty} is in use by a daemon (process {os.getpid()})"
     assert serial_ports.obstacle(pty) is None
+
+
+def test_a_serial_port_is_opened_by_one_alone(pty, minimal):
+    board = {"kind": "thermodaq", "port": pty}
+    settings = load(minimal | {"boards": {"daq": board}})
+    build = board_builder(settings.boards["daq"], SimulatedClock())
+    first = build()
+    with pytest.raises(LinkError, match=r"cannot open .*exclusively lock"):
+        build()
+    first.close()
+    build().close()
 
 
 def test_looking_at_a_lock_neither_takes_nor_makes_it(tmp_path):
@@ -180,6 +217,18 @@ def test_a_bad_configuration_fails_with_every_line_of_it(tmp_path):
     texts = [f.text for f in examine([path], tmp_path, SimulatedClock()) if f.status == FAIL]
     assert len(texts) == 2
     assert f"{path}:3: loops.tank.trip_above: unknown key" in texts[1]
+
+
+def test_a_latched_loop_fails_and_says_what_to_do(tmp_path, whole):
+    settings = load(tomllib.loads(whole))
+    assert list(latches(settings, tmp_path)) == []
+    LatchStore(tmp_path).save("tank", Latch("trip.over_temperature", "61.0 °C above 60 °C"))
+    [found] = latches(settings, tmp_path)
+    assert found.status == FAIL
+    assert found.text == (
+        "loop tank: trip.over_temperature, 61.0 °C above 60 °C; "
+        "remove the cause, then: thermoctl alarms ack"
+    )
 
 
 def test_a_healthy_machine_exits_0_and_an_ill_one_1(tmp_path, whole, capsys):
