@@ -130,7 +130,8 @@ class Regulator:
                 self._request_mode(request)
             case SetPoint(value_c):
                 accepted_c = self._limits.accept_setpoint(value_c)
-                self._emit("setpoint.changed", before_c=self._setpoint_c, after_c=accepted_c)
+                if accepted_c != self._setpoint_c:
+                    self._emit("setpoint.changed", before_c=self._setpoint_c, after_c=accepted_c)
                 self._setpoint_c = accepted_c
             case ManualPower(power):
                 self._manual_power = accept_power(power)

@@ -86,6 +86,12 @@ def test_a_loop_that_starts_in_manual_starts_at_power_0(drive_with):
     assert drive.run(10).command.power == 0.0
 
 
+def test_what_does_not_change_is_no_event(warm):
+    warm.regulator.request(SetPoint(37.5))
+    warm.regulator.request(Mode.AUTO)
+    assert warm.step().events == ()
+
+
 @pytest.mark.parametrize("code", ["sensor.open", "nonsense", 3])
 def test_acknowledging_an_alarm_that_is_not_there_is_refused(warm, code):
     with pytest.raises(Refused, match="expected an alarm of none"):
