@@ -102,8 +102,13 @@ def cli(
         return
     from thermoctl.app import bench
     from thermoctl.app import sim as simulation
+    from thermoctl.app.settings import load
 
-    settings = simulation.bench_settings(config, seed)
+    given = load(config or simulation.default_profile())
+    for name, tank in simulation.stand_ins(given).items():
+        tank_words = f"{tank.volume_l:.3g} l heated with {tank.heater_w:.0f} W"
+        click.echo(f"thermoctl: {tank_words} are simulated in place of board {name}", err=True)
+    settings = simulation.bench_settings(given, seed)
     as_json = as_json or not sys.stdout.isatty()
     options = bench.BenchOptions(
         speed=speed if speed is not None else (math.inf if as_json else 60.0),
