@@ -1,5 +1,6 @@
 """What is believed about the plant, and how sure the belief is."""
 
+from thermoctl.estimation.bank import LainiotisBank, Order
 from thermoctl.estimation.batch import Run, run_batch
 from thermoctl.estimation.belief import start
 from thermoctl.estimation.guards import Guarded, GuardedEstimate
@@ -15,6 +16,8 @@ __all__ = [
     "GuardedEstimate",
     "Identifier",
     "IdentifierBelief",
+    "LainiotisBank",
+    "Order",
     "RandomWalkKalman",
     "RecursiveLeastSquares",
     "Run",

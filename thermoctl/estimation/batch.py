@@ -106,9 +106,9 @@ def _run(law: RecursiveLaw, y: Array, phi: Array, belief: Estimate, careful: boo
     )
     for t in range(T):
         after = (theta[t], P[t], innovation[t], inflation[t])
-        S = _advance(law, before[0], before[1], phi[t], y[t], R1, after)
+        S = advance(law, before[0], before[1], phi[t], y[t], R1, after)
         if careful:
-            unusable = ~_usable(phi[t], S, *after[:3])
+            unusable = ~usable(phi[t], S, *after[:3])
             for new, old in zip(after, before, strict=True):
                 np.copyto(new, old, where=unusable)
         before = after
@@ -120,7 +120,7 @@ def _run(law: RecursiveLaw, y: Array, phi: Array, belief: Estimate, careful: boo
     )
 
 
-def _advance(
+def advance(
     law: RecursiveLaw,
     theta: Array,
     P: Array,
@@ -147,7 +147,7 @@ def _advance(
     return S
 
 
-def _usable(phi: Array, S: Array, theta: Array, P: Array, e: Array) -> npt.NDArray[np.bool_]:
+def usable(phi: Array, S: Array, theta: Array, P: Array, e: Array) -> npt.NDArray[np.bool_]:
     """Return where `RecursiveLaw.update` would take the sample, shape (R,); false for NaN."""
     size = (P * P).sum(axis=(0, 1)) + (theta * theta).sum(axis=0)
     usable: npt.NDArray[np.bool_] = np.abs(phi).sum(axis=0) < LARGEST

@@ -95,15 +95,15 @@ class Identifier:
         IdentifierBelief
             The new belief; its estimate is ``rejected`` when the sample could not be used.
         """
-        u_past = _pushed(belief.u_past, applied)
+        u_past = pushed(belief.u_past, applied)
         phi = self.structure.regressor(belief.y_past_c, u_past)
         target = self.structure.target(temperature_c, u_past)
         estimate = self.law.update(belief.estimate, phi, target)
-        return IdentifierBelief(estimate, _pushed(belief.y_past_c, temperature_c), u_past)
+        return IdentifierBelief(estimate, pushed(belief.y_past_c, temperature_c), u_past)
 
     def predict(self, belief: IdentifierBelief, applied: float) -> float:
         """Return the next temperature in degC under `applied`; NaN: not known."""
-        u_past = _pushed(belief.u_past, applied)
+        u_past = pushed(belief.u_past, applied)
         phi = self.structure.regressor(belief.y_past_c, u_past)
         return self.structure.temperature(float(belief.estimate.theta.dot(phi)), u_past)
 
@@ -116,12 +116,12 @@ class Identifier:
         temperature_c = self.predict(belief, applied)
         return IdentifierBelief(
             belief.estimate,
-            _pushed(belief.y_past_c, temperature_c),
-            _pushed(belief.u_past, applied),
+            pushed(belief.y_past_c, temperature_c),
+            pushed(belief.u_past, applied),
         )
 
 
-def _pushed(past: Array, newest: float) -> Array:
+def pushed(past: Array, newest: float) -> Array:
     """Return `past` with `newest` in front and the oldest gone."""
     if len(past) == 0:
         return past
