@@ -3,10 +3,12 @@
 from thermoctl.estimation.bank import LainiotisBank, Order
 from thermoctl.estimation.batch import Run, run_batch
 from thermoctl.estimation.belief import start
+from thermoctl.estimation.fading import MatrixFading, MultipleFading
 from thermoctl.estimation.guards import Guarded, GuardedEstimate
 from thermoctl.estimation.identifier import Identifier, IdentifierBelief
 from thermoctl.estimation.kalman import CorrectedKalman, RandomWalkKalman
 from thermoctl.estimation.least_squares import RecursiveLeastSquares, VariableForgetting
+from thermoctl.estimation.state_space import LinearModel, StateBelief, StateKalman
 from thermoctl.signals import Estimate
 
 __all__ = [
@@ -17,10 +19,15 @@ __all__ = [
     "Identifier",
     "IdentifierBelief",
     "LainiotisBank",
+    "LinearModel",
+    "MatrixFading",
+    "MultipleFading",
     "Order",
     "RandomWalkKalman",
     "RecursiveLeastSquares",
     "Run",
+    "StateBelief",
+    "StateKalman",
     "VariableForgetting",
     "run_batch",
     "start",
