@@ -1,4 +1,4 @@
-r"""Which order and which delay: a bank of filters that weigh themselves against each other.
+r"""Which order and which delay: filters that weigh themselves against each other.
 
 Every candidate runs a Kalman filter of its own on the same samples. How well it predicted each of
 them multiplies up to the probability that it is the true one, and what the bank as a whole
@@ -6,10 +6,10 @@ believes is the average under these probabilities.
 
 All filters run at once: the candidates are the replications of `thermoctl.estimation.batch`, each
 padded with zeros to the regressor that would hold them all. A coefficient a candidate does not have
-meets a regressor of 0 and has variance 0, so it stays 0 and disturbs nothing
+meets a regressor of 0: nothing is ever learned of it, so it stays 0, exactly, and disturbs nothing
 (``test_padding_changes_nothing_for_any_candidate``).
 
-Implements section 7 of ``docs/theory.md``.
+Implements section 8 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from thermoctl.estimation.batch import advance, usable
 from thermoctl.estimation.belief import LARGEST, floats, frozen, positive
 from thermoctl.estimation.identifier import pushed
 from thermoctl.estimation.kalman import RandomWalkKalman
+from thermoctl.estimation.recursion import drift, identity
 from thermoctl.model.arx import Arx
 from thermoctl.quantities import Array, is_finite_number
 
@@ -103,6 +104,7 @@ class LainiotisBank:
     P0: float = 100.0
     Q: float = 0.0
     floor: float = 1e-3
+    _law: RandomWalkKalman = field(init=False, repr=False)
     _layout: _Layout = field(init=False, repr=False)
     _belief: _Belief = field(init=False, repr=False)
 
@@ -116,6 +118,7 @@ class LainiotisBank:
             raise ValueError(f"floor must lie in [0, 1/{len(orders)}], got {self.floor!r}")
         layout = _Layout(orders)
         object.__setattr__(self, "candidates", orders)
+        object.__setattr__(self, "_law", RandomWalkKalman(self.Q, self.R))
         object.__setattr__(self, "_layout", layout)
         object.__setattr__(self, "_belief", layout.start(self.P0))
 
@@ -184,10 +187,10 @@ class LainiotisBank:
         u_past = pushed(before.u_past, u)
         phi = np.concatenate((-before.y_past, u_past, ZERO))[layout.lags]  # O21 (3)
         theta, P, e = np.empty_like(phi), np.empty_like(before.P), np.empty(phi.shape[1])
-        R1 = self.Q * layout.diagonal if self.Q else None
-        law, after = RandomWalkKalman(0.0, self.R), (theta, P, e, np.empty_like(e))
+        R1 = drift(self.Q, len(phi))[:, :, None] if self.Q else None
+        after = (theta, P, e, np.empty_like(e))
         with np.errstate(all="ignore"):  # what overflows here is found in the result
-            S = advance(law, before.theta, before.P, phi, np.full_like(e, y), R1, after)
+            S = advance(self._law, before.theta, before.P, phi, np.full_like(e, y), R1, after)
             if not usable(phi, S, theta, P, e).all():
                 return self._with(before.marked())
         log_L = -0.5 * (np.log(S) + e * e / S)  # ALF (7), (8)
@@ -237,11 +240,10 @@ class _Layout:
     """Where each coefficient of each candidate finds its regressor.
 
     `lags`, shape (p, k), are places in (-y(t-1), -y(t-2), ..., u(t-1), u(t-2), ..., 0); the 0 at
-    the end is for coefficients a candidate does not have. `present` tells those it has, and
-    `diagonal`, shape (p, p, k), has a 1 for each of them.
+    the end is for coefficients a candidate does not have, and `present` tells those it has.
     """
 
-    __slots__ = ("diagonal", "lags", "nested", "orders", "present", "u_memory", "y_memory")
+    __slots__ = ("lags", "nested", "orders", "present", "u_memory", "y_memory")
 
     def __init__(self, orders: tuple[Order, ...]) -> None:
         self.orders = orders
@@ -256,14 +258,13 @@ class _Layout:
             self.lags[: order.n, i] = np.arange(order.n)
             self.lags[n : n + order.m, i] = np.arange(newest, newest + order.m)
         self.present: npt.NDArray[np.bool_] = self.lags < zero
-        self.diagonal: Array = np.eye(n + m)[:, :, None] * self.present
 
     def start(self, P0: float) -> _Belief:
         """Return what is believed before the first sample."""
         p, k = self.lags.shape
         return _Belief(
             frozen(np.zeros((p, k))),
-            frozen(P0 * self.diagonal),
+            frozen(np.repeat(P0 * identity(p)[:, :, None], k, axis=2)),
             frozen(np.full(k, -math.log(k))),
             frozen(np.full(k, 1.0 / k)),
             frozen(np.zeros(self.y_memory)),

@@ -129,9 +129,10 @@ def advance(
     R1: Array | None,
     after: tuple[Array, Array, Array, Array],
 ) -> Array:
-    """Write theta, P, e and the inflation of every replication into `after`, and return S.
+    """Write what each replication believes after a sample into `after`, and return S.
 
-    `theta` and `phi` have shape (n, R), P has (n, n, R) and `y`, e, S and the inflation have (R,).
+    `after` is theta, P, e and the inflation. `theta` and `phi` have shape (n, R), P has (n, n, R)
+    and `y`, e, S and the inflation have (R,).
     """
     new_theta, new_P, e, inflation = after
     P_phi = _dot(P, phi)  # P is symmetric: its rows are its columns
@@ -148,7 +149,7 @@ def advance(
 
 
 def usable(phi: Array, S: Array, theta: Array, P: Array, e: Array) -> npt.NDArray[np.bool_]:
-    """Return where `RecursiveLaw.update` would take the sample, shape (R,); false for NaN."""
+    """Return where a law would take the sample, shape (R,); false for NaN."""
     size = (P * P).sum(axis=(0, 1)) + (theta * theta).sum(axis=0)
     usable: npt.NDArray[np.bool_] = np.abs(phi).sum(axis=0) < LARGEST
     usable &= (e * e < LARGEST * S) & np.isfinite(S) & (size < LARGEST * LARGEST)
