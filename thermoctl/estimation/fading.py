@@ -67,10 +67,12 @@ class MultipleFading(StateLaw):
         rows, states = np.arange(self.model.m), self.observed
         b = np.diag(H @ Q @ H.T + R)  # BO17 (18)
         scale = H[rows, states] ** 2 * prediction.J[states, states]
-        wanted = (prediction.v**2 / self.critical - b) / scale  # BO17 (22) solved for s^2
+        known = ~(scale > 0.0)  # exactly, so that no factor would change anything
+        # BO17 (22) solved for s^2
+        wanted = (prediction.v**2 / self.critical - b) / np.where(known, np.inf, scale)
         s = np.ones(self.model.n)
-        # NaN, from a variance of 0, is passed over; of several rows on a state the largest counts.
-        np.fmax.at(s, states, np.sqrt(np.fmax(wanted, 1.0)))  # BO17 (23)
+        # Of several rows on one state the largest counts.
+        np.maximum.at(s, states, np.sqrt(np.maximum(wanted, 1.0)))  # BO17 (23)
         return s
 
 

@@ -185,12 +185,11 @@ class StateLaw:
         if belief.x.shape != (n,):
             raise ValueError(f"belief must be one of {n} states, got {len(belief.x)}")
         with np.errstate(all="ignore"):  # overflow shows in the result, which is looked at
-            if _sane(observation):
-                prediction = self._predict(belief, observation)
-                for fading in self.factors(prediction):
-                    corrected = self._correct(belief, prediction, fading)
-                    if corrected is not None:
-                        return corrected
+            prediction = self._predict(belief, observation)
+            for fading in self.factors(prediction):
+                corrected = self._correct(belief, prediction, fading)
+                if corrected is not None:
+                    return corrected
         return replace(belief, rejected=True)
 
     def factors(self, prediction: Prediction) -> Iterator[Array]:
@@ -213,8 +212,6 @@ class StateLaw:
         H, R = self.model.H, self.model.R
         P = faded(self.model, prediction.J, fading)
         S = H @ P @ H.T + R  # BO17 (10)
-        if not _sane(P, S, prediction.v):
-            return None
         try:
             K = np.linalg.solve(S, H @ P).T  # BO17 (5)
         except np.linalg.LinAlgError:  # R drowned in H P H'
@@ -225,7 +222,7 @@ class StateLaw:
         # short form cancels, see test_a_huge_prior_leaves_the_covariance_positive_definite.
         P = A @ P @ A.T + K @ R @ K.T
         P = 0.5 * (P + P.T)
-        if not _sane(x, P, prediction.C):
+        if not _sane(x, P, S, prediction.C):
             return None
         return StateBelief(
             frozen(x),

@@ -129,12 +129,12 @@ def test_a_run_agrees_with_the_formulas_written_out(build, n, columns):
         P = np.diag(s) @ J @ np.diag(s) + model.Q
         S = model.H @ P @ model.H.T + model.R
         K = P @ model.H.T @ np.linalg.inv(S)
-        x, corrected = model.F @ belief.x + K @ v, P - K @ model.H @ P
+        x = model.F @ belief.x + K @ v
         belief = law.update(belief, z)
         assert belief.fading == pytest.approx(s, rel=1e-8)
         assert belief.innovation_cov == pytest.approx(S, rel=1e-8)
         assert belief.x == pytest.approx(x, rel=1e-8, abs=1e-10)
-        assert belief.P == pytest.approx(corrected, rel=1e-6, abs=1e-10)
+        np.testing.assert_allclose(belief.P, P - K @ model.H @ P, rtol=1e-6, atol=1e-10)
         assert np.linalg.eigvalsh(belief.P)[0] > 0.0
         adapted += bool((s != 1.0).any())
     assert adapted > 5
@@ -218,6 +218,13 @@ def test_the_search_ends_where_an_unobserved_state_is_no_longer_corrected():
     assert abs(belief.x[1] - 15.0) < 0.1
 
 
+@pytest.mark.parametrize(("settings", "steps"), [({}, 20), ({"max_iterations": 3}, 3)], ids=str)
+def test_each_step_takes_a_factor_the_same_part_of_the_way_to_zero(settings, steps):
+    law = MatrixFading(STUDY, tau=0.1, delta=1e-30, **settings)
+    belief = law.update(law.start([7.0, 7.0], 1.0), 15.0)
+    assert belief.fading[0] == pytest.approx((1.0 - 2.0 * 0.1) ** steps, rel=1e-9)
+
+
 @by_law
 def test_a_run_does_not_depend_on_the_order_of_the_states(build):
     rng = np.random.default_rng(3)
@@ -257,11 +264,32 @@ def test_outliers_of_every_size_leave_a_sound_belief(build):
         assert np.linalg.eigvalsh(belief.P)[0] >= -1e-9 * np.abs(belief.P).max()
 
 
-def test_a_state_known_exactly_needs_no_factor():
-    law = MatrixFading(LinearModel(np.eye(2), [[1.0, 0.0]], 0.0, 1.0))
-    belief = law.update(law.start([0.0, 0.0], 0.0), 100.0)
+by_filter = pytest.mark.parametrize("filter_of", [MultipleFading, MatrixFading])
+
+
+@by_filter
+def test_a_state_known_exactly_needs_no_factor_and_takes_none_from_others(filter_of):
+    law = filter_of(LinearModel(np.eye(3), np.eye(3)[:2], 0.0, 1.0))
+    belief = law.update(law.start(np.zeros(3), np.diag([0.0, 1.0, 0.0])), [100.0, 100.0])
+    assert belief.fading[0] == belief.fading[2] == 1.0
+    assert belief.fading[1] > 10.0
+    assert belief.x[0] == belief.x[2] == 0.0
+
+
+@by_filter
+def test_where_factors_overflow_the_kalman_filter_remains(filter_of):
+    law = filter_of(LinearModel(np.eye(2), [[1.0, 0.0]], 0.0, 1.0))
+    belief = law.update(law.start([1.0, 2.0], 5e-324), 100.0)
+    assert not belief.rejected
     assert np.array_equal(belief.fading, [1.0, 1.0])
-    assert np.array_equal(belief.x, [0.0, 0.0])
+    assert np.array_equal(belief.x, [1.0, 2.0])
+
+
+@pytest.mark.parametrize("gate", [None, 1.0])
+def test_a_search_that_cannot_be_solved_rejects_the_observation(gate):
+    twice = LinearModel(np.eye(2), [[1.0, 0.0], [1.0, 0.0]], 0.0, 1e-6)
+    law = MatrixFading(twice, gate=gate)
+    assert law.update(law.start([0.0, 0.0], 1e20), [1.0, 1.0]).rejected
 
 
 @pytest.mark.parametrize("H", [[[1.0, 1.0]], [[0.0, 0.0]], [[1.0, 0.0], [0.5, 2.0]]])
