@@ -1,8 +1,9 @@
 """Cost of the estimators: ``python benchmarks/estimators.py``.
 
 Prints microseconds of one update for each law and number of parameters, of one update of an
-identifier, and milliseconds of 1,000 x 400 replications at once and as a plain loop. Every figure
-is CPU time, the median over rounds with the smallest and the largest beside it.
+identifier and of a Lainiotis bank, and milliseconds of 1,000 x 400 replications at once and as a
+plain loop. Every figure is CPU time, the median over rounds with the smallest and the largest
+beside it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import time
 import timeit
 from collections.abc import Callable
 from functools import partial
+from itertools import product
 
 import numpy as np
 
@@ -19,6 +21,8 @@ from thermoctl.estimation import (
     CorrectedKalman,
     Guarded,
     Identifier,
+    LainiotisBank,
+    Order,
     RandomWalkKalman,
     RecursiveLeastSquares,
     VariableForgetting,
@@ -78,6 +82,19 @@ def identifiers() -> None:
         show(name, partial(identifier.update, belief, 27.0, 0.5), 1e-6, 4000)
 
 
+def lainiotis_banks() -> None:
+    """Time one update of a bank of few candidates and of many."""
+    print("Lainiotis bank update, us")
+    for n, m, d in ((2, 2, 3), (4, 3, 20)):
+        orders = [
+            Order(*sizes) for sizes in product(range(1, n + 1), range(1, m + 1), range(1, d + 1))
+        ]
+        bank = LainiotisBank(orders)
+        for t in range(50):
+            bank = bank.update(0.03 * t, 0.5)
+        show(f"LainiotisBank, {len(orders)} candidates", partial(bank.update, 1.6, 0.4), 1e-6, 1000)
+
+
 def one_by_one(law: Estimator, y: Array, phi: Array) -> None:
     """Run `law` over the replications of `y`, shape (T, R), one after the other."""
     for r in range(y.shape[1]):
@@ -106,4 +123,5 @@ def batches() -> None:
 if __name__ == "__main__":
     updates()
     identifiers()
+    lainiotis_banks()
     batches()

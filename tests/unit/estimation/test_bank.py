@@ -179,6 +179,21 @@ def test_delays_are_told_apart(delay):
     np.testing.assert_allclose(bank.theta, [-1.2, 0.5, 0.8], atol=0.3)
 
 
+def samples_to_notice(floor):
+    """Return how long a delay that grew from 1 to 3 goes unnoticed after 600 samples."""
+    candidates = [Order(2, 1, 1), Order(2, 1, 3)]
+    bank = LainiotisBank(candidates, R=0.09, Q=1e-3, floor=floor)
+    bank = taught(bank, plant(600, delay=1))
+    assert bank.best == candidates[0]
+    after = enumerate(banks(bank, plant(1200, delay=3, seed=2)), 1)
+    return next((t for t, bank in after if bank.best == candidates[1]), math.inf)
+
+
+def test_the_floor_lets_a_candidate_come_back():
+    assert samples_to_notice(1e-3) <= 20
+    assert samples_to_notice(0.0) > 5 * samples_to_notice(1e-3)
+
+
 def test_under_different_delays_theta_is_that_of_the_best():
     bank = taught(LainiotisBank([Order(1, 1, 2), Order(2, 1, 1)], R=0.3), plant(5))
     alone = taught(LainiotisBank([bank.best], R=0.3), plant(5))
