@@ -205,7 +205,7 @@ class Criterion:
     def of(
         cls, model: LinearModel, prediction: Prediction, s: Array, hidden: Indices
     ) -> Criterion | None:
-        """Return the criterion for factors of the states `hidden`; None where S is singular.
+        """Return the criterion for the states `hidden`; None where S is singular.
 
         `s` holds the factors of all states, shape (n,); those of `hidden` do not matter, because
         they do not enter the innovation's covariance.

@@ -1,4 +1,4 @@
-r"""The Kalman filter of a known linear model, and the frame its fading relatives share.
+r"""The Kalman filter of a known model, and what its fading relatives share.
 
 .. math:: x_k = F x_{k-1} + w_k, \qquad z_k = H x_k + v_k
 
@@ -193,7 +193,7 @@ class StateLaw:
         return replace(belief, rejected=True)
 
     def factors(self, prediction: Prediction) -> Iterator[Array]:
-        """Yield diagonals of S(k), shape (n,): the wanted one first, then what to fall back on."""
+        """Yield diagonals of S(k), shape (n,): the wanted one, then fallbacks."""
         yield np.ones(self.model.n)
 
     def _predict(self, belief: StateBelief, z: Array) -> Prediction:
@@ -247,7 +247,7 @@ class StateKalman(StateLaw):
 
 
 def faded(model: LinearModel, J: Array, fading: Array) -> Array:
-    """Return P(k|k-1) with the propagated part `J` scaled from both sides, shape (n, n)."""
+    """Return P(k|k-1), shape (n, n), with its part `J` scaled from both sides."""
     return fading[:, None] * J * fading + model.Q  # BO17 (14)
 
 

@@ -81,7 +81,7 @@ def test_the_mean_square_is_that_of_every_innovation_used():
     assert belief.mean_square == pytest.approx(np.mean(squares, axis=0))
 
 
-@pytest.mark.parametrize("z", [math.nan, math.inf, -math.inf, 1e200])
+@pytest.mark.parametrize("z", [math.nan, math.inf, -math.inf, 1e30, 1e200])
 def test_an_unusable_observation_leaves_the_belief_but_for_the_mark(z):
     law = StateKalman(MODEL)
     before = after(law, [0.3, 0.1])
