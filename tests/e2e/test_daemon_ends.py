@@ -159,7 +159,7 @@ def test_a_signal_while_it_starts_ends_it_with_nothing_switched_on(start, number
     code, took_s = daemon.end(number, number)
     print(f"{number!r} at the start: ended after {took_s:.2f} s")
     assert (code, took_s < 2.0) == (0, True)
-    assert daemon.named("loop.stopped")[0]["power_0_confirmed"] is True
+    assert daemon.named("loop.stopped")[0]["output_may_be_on"] is False
 
 
 def test_a_signal_while_a_board_hangs_in_opening_ends_it_within_two_seconds(start):
@@ -177,6 +177,9 @@ def test_a_signal_while_a_board_hangs_in_opening_ends_it_within_two_seconds(star
     print(f"TERM while a board hangs in opening: ended after {took_s:.2f} s")
     assert (code, took_s < 2.0) == (0, True)
     assert "Traceback" not in daemon.log.read_text()
+    stopped = daemon.named("loop.stopped")[0]
+    assert (stopped["output_may_be_on"], stopped["unreached"]) == (False, ["daq"])
+    assert stopped["power_0_confirmed"] is False  # nobody was there to confirm it
 
 
 HUNG_READ = BROKEN_READ.replace("raise ERROR", "__import__('time').sleep(60)")

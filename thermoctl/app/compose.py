@@ -5,7 +5,9 @@ The only place that knows which class stands behind a port, and where boards are
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -91,7 +93,11 @@ def _serial_link(settings: Any) -> serial.Serial:
             exclusive=True,
         )
     except (serial.SerialException, OSError, ValueError) as error:
-        raise LinkError(f"cannot open {settings.port}: {error}") from error
+        number = getattr(error, "errno", None)  # the library says the same thing three times over
+        why = os.strerror(number) if number else str(error)
+        if number == errno.EWOULDBLOCK:  # of the lock that exclusive=True takes
+            why = "another program holds it"
+        raise LinkError(f"expected a serial port at {settings.port}: {why}") from error
 
 
 # -- the loop --------------------------------------------------------------------------------------

@@ -107,7 +107,8 @@ class Daemon:
         self._keeper = LatchKeeper(
             self._latches, self._acknowledged_on_disk, report=self._journal.emit
         )
-        self._confirmed = self._failed = self._ready = False
+        self._off = self._failed = self._ready = False
+        self._unreached: list[str] = []
         self._ending = self._reloading = False
         # A service reloads at a hang-up; who started it by hand and closed the terminal is gone.
         self._on_terminal = os.isatty(0)
@@ -115,7 +116,7 @@ class Daemon:
     # -- running ---------------------------------------------------------------------------------
 
     def run(self) -> bool:
-        """Run until a signal ends it; return whether every board confirmed 0."""
+        """Run until a signal ends it; return whether no output can be on."""
         for number in SIGNALS:
             signal.signal(number, self._note_signal)
         with contextlib.ExitStack() as stack:
@@ -139,9 +140,9 @@ class Daemon:
                 self._notifier.stopping()
                 control.join(_STOP_S)
                 self._say_the_rest()
-                self._emit("loop.stopped", None, power_0_confirmed=self._confirmed)
+                self._emit("loop.stopped", None, **self._ends())
             self._resumption.store(self._settings, dict(self._seen.cycles))
-        return self._confirmed and not self._failed
+        return self._off and not self._failed
 
     def _control(self) -> None:
         try:
@@ -151,7 +152,16 @@ class Daemon:
             text = f"{type(error).__name__}: {error}"
             self._emit("loop.failed", None, error=text, trace=traceback.format_exc())
         finally:
-            self._confirmed = self._loop.shut_down()
+            self._unreached = [each.name for each in self._loop.boards if each.board is None]
+            self._off = self._loop.shut_down()
+
+    def _ends(self) -> dict[str, object]:
+        """Return what is known of the heaters at the end; a board not reached confirms nothing."""
+        return {
+            "power_0_confirmed": self._off and not self._unreached,
+            "output_may_be_on": not self._off,
+            "unreached": self._unreached,
+        }
 
     def _stop(self) -> None:
         """End the loop after the cycle that is under way; called by a signal handler, too."""
