@@ -53,6 +53,7 @@ def test_a_replay_is_drawn_as_png_and_svg(tmp_path, count):
 def test_a_replay_with_an_input_that_stands_still_can_be_drawn(tmp_path):
     result = replay(made_record(u=np.ones(300)), Arx(1, 1, 1), [parse_law("ckf")])
     draw_replay(result, [tmp_path / "r.png"])
+    assert (tmp_path / "r.png").read_bytes().startswith(PNG)
 
 
 @pytest.mark.parametrize("law", ["vff:1,forgetting_min=0.01", "vff:1,forgetting_min=0.5"])
@@ -140,6 +141,7 @@ def test_an_experiment_is_drawn_as_png_and_svg(tmp_path):
 )
 def test_an_experiment_that_shows_little_can_still_be_drawn(tmp_path, run):
     draw_experiment(run, measure(run), "title", [tmp_path / "e.png"])
+    assert (tmp_path / "e.png").read_bytes().startswith(PNG)
 
 
 def test_the_same_run_gives_the_same_file(tmp_path):
