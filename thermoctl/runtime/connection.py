@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 from thermoctl.errors import DriverError, LinkError, TransientError, WrongDevice
-from thermoctl.ports import Board, Clock
+from thermoctl.ports import Board, Clock, Identity
 from thermoctl.signals import RawSample
 
 OPEN_S = 5.0
@@ -55,6 +55,7 @@ class Connection:
         self._board: Board | None = None
         self._opening: threading.Thread | None = None
         self._opened: Board | DriverError | None = None
+        self._identity = Identity("", "", "")
         self._closed = False
         self._driven = False
         self._answered_s = float("-inf")
@@ -155,7 +156,7 @@ class Connection:
         board: Board | None = None
         try:
             board = self._build()
-            identity = board.open(self._clock.now_s() + OPEN_S)
+            self._identity = board.open(self._clock.now_s() + OPEN_S)
         except Exception as error:  # noqa: BLE001 - drivers come from entry points
             if board is not None:
                 self._close_quietly(board)
@@ -164,7 +165,6 @@ class Connection:
             if not isinstance(error, OSError):
                 self._report("board.failed", board=self.name, trace=traceback.format_exc())
             return LinkError(f"{type(error).__name__}: {error}")
-        self._report("board.opened", board=self.name, kind=identity.kind, version=identity.version)
         return board
 
     def _collect(self) -> None:
@@ -174,6 +174,8 @@ class Connection:
         if not isinstance(opened, DriverError):
             self._board, self._retry_s, self._driven = opened, _RETRY_FIRST_S, False
             self._answered_s = self._clock.now_s()
+            who = self._identity
+            self._report("board.opened", board=self.name, kind=who.kind, version=who.version)
             return
         self.last_error = str(opened)
         event = "board.wrong" if isinstance(opened, WrongDevice) else "board.retry"
