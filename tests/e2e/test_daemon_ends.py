@@ -1,11 +1,8 @@
 """How the daemon ends: signals at awkward moments, threads that die; and reloads of anything."""
 
-import json
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -41,62 +38,10 @@ sys.exit(0 if ended else 1)
 """
 
 
-class Process:
-    """A daemon with folders of its own; `breaks` is Python that is run before it starts."""
-
-    def __init__(self, folder, breaks=None, config=AQUARIUM):
-        self.config, self.log = folder / "own.toml", folder / "log"
-        self.config.write_text(config)
-        run = folder / "run"
-        run.mkdir(mode=0o700)
-        environ = {**os.environ, "XDG_RUNTIME_DIR": str(run), "PYTHONUNBUFFERED": "1"}
-        environ.pop("NOTIFY_SOCKET", None)
-        state = str(folder / "state")
-        if breaks is None:
-            words = ["-m", "thermoctl", "run", "-c", str(self.config), "--state", state]
-        else:
-            words = ["-c", WATCHED.replace("BREAK", breaks), str(self.config), state]
-        with self.log.open("a") as log:
-            self.process = subprocess.Popen(
-                [sys.executable, *words], env=environ, stderr=log, stdout=log, cwd=folder
-            )
-
-    def events(self):
-        lines = self.log.read_text().splitlines()
-        return [json.loads(line) for line in lines if line.startswith("{")]
-
-    def named(self, name):
-        return [event for event in self.events() if event["event"] == name]
-
-    def wait_for(self, name, count=1):
-        until_s = time.monotonic() + PATIENCE_S
-        while len(self.named(name)) < count:
-            if time.monotonic() > until_s:
-                pytest.fail(f"no {name} within {PATIENCE_S} s:\n{self.log.read_text()}")
-            time.sleep(0.02)
-
-    def end(self, *signals):
-        """Send `signals`; return the exit code and how long the end took."""
-        began_s = time.monotonic()
-        for number in signals:
-            self.process.send_signal(number)
-        code = self.process.wait(PATIENCE_S)
-        return code, time.monotonic() - began_s
-
-
 @pytest.fixture
-def start(tmp_path):
-    started = []
-
-    def begin(*arguments, **named):
-        started.append(Process(tmp_path, *arguments, **named))
-        return started[-1]
-
-    yield begin
-    for each in started:
-        if each.process.poll() is None:
-            each.process.kill()
-        each.process.wait(PATIENCE_S)
+def broken(start):
+    """Return a function that starts a daemon after the Python in `breaks`."""
+    return lambda breaks: start(WATCHED.replace("BREAK", breaks))
 
 
 BROKEN_READ = """
@@ -110,8 +55,8 @@ Board.read = broken
 
 
 @pytest.mark.parametrize("error", ["SystemExit(0)", "KeyboardInterrupt()", "GeneratorExit()"])
-def test_a_control_thread_that_is_ended_leaves_power_0_says_so_and_is_no_success(start, error):
-    daemon = start(BROKEN_READ.replace("ERROR", error))
+def test_a_control_thread_that_is_ended_leaves_power_0_says_so_and_is_no_success(broken, error):
+    daemon = broken(BROKEN_READ.replace("ERROR", error))
     daemon.wait_for("loop.started")
     began_s = time.monotonic()
     code = daemon.process.wait(PATIENCE_S)
@@ -134,8 +79,8 @@ daemon.Resumption.store = broken
 """
 
 
-def test_a_main_thread_that_dies_takes_the_heat_with_it(start):
-    daemon = start(BROKEN_MAIN)
+def test_a_main_thread_that_dies_takes_the_heat_with_it(broken):
+    daemon = broken(BROKEN_MAIN)
     assert daemon.process.wait(PATIENCE_S) == 1
     text = daemon.log.read_text()
     assert "the main thread has a bug" in text
@@ -143,8 +88,8 @@ def test_a_main_thread_that_dies_takes_the_heat_with_it(start):
     assert daemon.named("loop.stopped")[0]["power_0_confirmed"] is True
 
 
-def test_a_signal_in_the_middle_of_a_reload_ends_it_with_power_0(start):
-    daemon = start("pass")
+def test_a_signal_in_the_middle_of_a_reload_ends_it_with_power_0(broken):
+    daemon = broken("pass")
     daemon.wait_for("board.opened")
     code, took_s = daemon.end(signal.SIGHUP, signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
     print(f"HUP TERM HUP INT: ended after {took_s:.2f} s")
@@ -185,8 +130,8 @@ def test_a_signal_while_a_board_hangs_in_opening_ends_it_within_two_seconds(star
 HUNG_READ = BROKEN_READ.replace("raise ERROR", "__import__('time').sleep(60)")
 
 
-def test_a_driver_that_hangs_for_ever_cannot_keep_the_process_and_is_no_success(start):
-    daemon = start(HUNG_READ)
+def test_a_driver_that_hangs_for_ever_cannot_keep_the_process_and_is_no_success(broken):
+    daemon = broken(HUNG_READ)
     daemon.wait_for("board.opened")
     time.sleep(3.5)
     code, took_s = daemon.end(signal.SIGTERM)
