@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import threading
@@ -27,6 +28,7 @@ pytestmark = pytest.mark.hil
 CONFIG = Path(__file__).parents[2] / "config" / "thermodaq.toml"
 PATIENCE_S = 60.0  # a daemon that met no board at once heats after 30 s of good data
 DEAD_MAN_S = 2.5
+HELD_CYCLES = 5
 REPLY_S = 0.5  # of a noisy machine; a board answers within 20 ms
 
 
@@ -135,6 +137,18 @@ def daemon(folder: Path, port: Path) -> Iterator[subprocess.Popen[bytes]]:
         process.wait(PATIENCE_S)
 
 
+def in_control(folder: Path) -> list[tuple[float, float]]:
+    """Return the power and what was taken of it, for every recorded cycle in RUN."""
+    history = folder / "state" / "history.sqlite"
+    if not history.exists():
+        return []
+    with closing(sqlite3.connect(f"file:{history}?mode=ro", uri=True)) as connection:
+        rows = connection.execute(
+            "select power, accepted_power from cycles where state = 'run' and accepted_power > 0"
+        )
+        return rows.fetchall()
+
+
 @pytest.mark.slow
 @pytest.mark.e2e
 def test_the_board_cuts_within_three_seconds_of_a_killed_daemon(
@@ -143,7 +157,11 @@ def test_the_board_cuts_within_three_seconds_of_a_killed_daemon(
     with running(tmp_path / "daq", "simavr") as device:
         with daemon(tmp_path, tmp_path / "daq") as process:
             wait_until(lambda: device.board.on_s > 0.5, "heat from the daemon")
-            assert device.tank.temperature_c == pytest.approx(37.0, abs=0.5)
+            wait_until(lambda: len(in_control(tmp_path)) >= HELD_CYCLES, "cycles in control")
+            assert device.tank.temperature_c == pytest.approx(37.25, abs=0.5)
+            for power, accepted in in_control(tmp_path):
+                assert 0.0 < power < 1.0  # neither full power nor a cut: the law steers
+                assert accepted == pytest.approx(power, abs=0.01)
             process.send_signal(signal.SIGKILL)
             killed_s = device.t_s
             process.wait(PATIENCE_S)
