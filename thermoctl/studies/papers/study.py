@@ -49,8 +49,8 @@ class Outcome:
     table : sequence of mappings
         Rows of numbers under the keys of JSON; every row has all of them, None: not known.
     figures : mapping
-        For every figure its title and numbers, ready for JSON: lists, not arrays; no NaN. The key is
-        the number the figure has in the paper, or a word where the paper has none.
+        For every figure its title and numbers, ready for JSON: lists, not arrays; no NaN. The key
+        is the number the figure has in the paper, or a word where the paper has none.
     """
 
     replications: int
