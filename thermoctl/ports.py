@@ -5,6 +5,7 @@ Runtime and drivers know these, not each other; `thermoctl.app.compose` puts the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol, runtime_checkable
@@ -149,6 +150,8 @@ class Situation:
     y_past_c, u_past : ndarray
         Past temperatures and applied powers, newest first: ``y_past_c[0]`` is this sample and
         ``u_past[0]`` is `applied`. As many as the structure of the model needs.
+    measured_c : float
+        This reading; NaN when there is none, or none to be believed.
     """
 
     t_s: float
@@ -159,15 +162,25 @@ class Situation:
     estimate: Estimate
     y_past_c: Array
     u_past: Array
+    measured_c: float = math.nan
 
 
 class Controller(Protocol):
-    """A law of control: frozen; what it remembers goes in and comes out."""
+    """A law of control: frozen; what it remembers goes in and comes out.
+
+    Once per sample it is shown the situation by `observe`, in every mode and state, in charge or
+    not. Only when its power is wanted, `decide` follows. A law may fail in any of its methods:
+    that costs the heat, and its belief stays as it was.
+    """
 
     name: ClassVar[str]
 
     def start(self) -> Any:
         """Return the belief before the first sample."""
+        ...
+
+    def observe(self, belief: Any, situation: Situation) -> Any:
+        """Return the belief after this sample, whoever steers."""
         ...
 
     def decide(self, belief: Any, situation: Situation) -> tuple[Any, float]:
@@ -178,7 +191,14 @@ class Controller(Protocol):
         """Return the estimate in the operator's words, holding power included if known."""
         ...
 
-    @property
-    def ride_s(self) -> float:
-        """How long the model may steer without a sensor: three lags, or 0."""
+    def ride_s(self, belief: Any) -> float:
+        """Return how long the model may steer without a sensor: three lags, or 0."""
+        ...
+
+    def remarks(self, belief: Any) -> Mapping[str, str]:
+        """Return what is out of the ordinary: names of events, a sentence for each.
+
+        An event is emitted when a name appears, with ``active=True`` and the sentence, and one when
+        it is gone, with ``active=False``.
+        """
         ...

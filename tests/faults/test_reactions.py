@@ -409,10 +409,18 @@ class Poison:
     value: Any
     after_s: float = 3.0
     name: ClassVar[str] = "poison"
-    ride_s: ClassVar[float] = 0.0
 
     def start(self) -> None:
         return None
+
+    def observe(self, belief: None, situation: Any) -> None:
+        return None
+
+    def ride_s(self, belief: None) -> float:
+        return 0.0
+
+    def remarks(self, belief: None) -> dict[str, str]:
+        return {}
 
     def beliefs(self, belief: None, situation: Any) -> Beliefs:
         return Beliefs()

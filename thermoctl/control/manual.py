@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -36,6 +37,9 @@ class Manual:
     def start(self) -> None:
         """Return None: there is nothing to remember."""
 
+    def observe(self, belief: None, situation: Situation) -> None:
+        """Return None: no sample matters."""
+
     def decide(self, belief: None, situation: Situation) -> tuple[None, float]:
         """Return the fixed power."""
         return None, self.power
@@ -44,7 +48,10 @@ class Manual:
         """Return nothing: a fixed power believes nothing of its plant."""
         return Beliefs()
 
-    @property
-    def ride_s(self) -> float:
+    def ride_s(self, belief: None) -> float:
         """Return 0: it does not look at the sensor and so does not steer without one."""
         return 0.0
+
+    def remarks(self, belief: None) -> Mapping[str, str]:
+        """Return nothing: a fixed power has nothing to remark."""
+        return {}

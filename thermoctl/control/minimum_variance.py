@@ -6,6 +6,7 @@ Implements section 5 of ``docs/theory.md``.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -79,6 +80,9 @@ class SelfTuningMinimumVariance:
 
     def start(self) -> None:
         """Return None: all that is remembered are the estimate and the applied inputs."""
+
+    def observe(self, belief: None, situation: Situation) -> None:
+        """Return None: the identifier learns, and the situation holds what it has learnt."""
 
     def decide(self, belief: None, situation: Situation) -> tuple[None, float]:
         """Return the next interval's power, unbounded; NaN when not known."""
@@ -164,10 +168,13 @@ class SelfTuningMinimumVariance:
             return None
         return clamp(power, 0.0, 1.0)
 
-    @property
-    def ride_s(self) -> float:
-        """How long the model may steer without a sensor: Tc, at most 60 s."""
+    def ride_s(self, belief: None) -> float:
+        """Return how long the model may steer without a sensor: Tc, at most 60 s."""
         return min(self.reference_time_s, RIDE_MAX_S)
+
+    def remarks(self, belief: None) -> Mapping[str, str]:
+        """Return nothing."""
+        return {}
 
 
 def _known(past: Array, otherwise: float) -> Array:

@@ -6,6 +6,7 @@ Implements section 6 of ``docs/theory.md``.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -43,6 +44,10 @@ class OnOff:
         """Return that it is off."""
         return False
 
+    def observe(self, belief: bool, situation: Situation) -> bool:
+        """Return the belief as it was: only what it decides itself counts."""
+        return belief
+
     def decide(self, belief: bool, situation: Situation) -> tuple[bool, float]:
         """Return whether it is on, and 1 or 0; NaN while the temperature is not known."""
         below_k = situation.setpoint_c - situation.temperature_c
@@ -56,7 +61,10 @@ class OnOff:
         """Return nothing: a thermostat believes nothing of its plant."""
         return Beliefs()
 
-    @property
-    def ride_s(self) -> float:
+    def ride_s(self, belief: bool) -> float:
         """Return 0: without a sensor it cannot steer."""
         return 0.0
+
+    def remarks(self, belief: bool) -> Mapping[str, str]:
+        """Return nothing: a thermostat is always itself."""
+        return {}

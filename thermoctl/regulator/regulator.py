@@ -7,18 +7,17 @@ clock, no hardware and no file. The walk of a sample through it is `Regulator.st
 from __future__ import annotations
 
 import math
-import traceback
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from dataclasses import dataclass
 
 from thermoctl.errors import Refused
 from thermoctl.estimation.identifier import Identifier, IdentifierBelief
 from thermoctl.ports import Controller, Situation
 from thermoctl.quantities import clamp, is_finite_number
+from thermoctl.regulator.guard import Guard
 from thermoctl.regulator.holding import Holding
 from thermoctl.regulator.judge import Verdict
 from thermoctl.regulator.limits import Limits, accept_power
+from thermoctl.regulator.steering import Steering
 from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import (
     Acknowledge,
@@ -37,7 +36,6 @@ from thermoctl.signals import (
 
 _NAN_IN_A_ROW = 3
 _EARLIER_TEXT = "latched before this start: {}"
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +90,11 @@ class Regulator:
         self._mode = plan.mode
         self._events: list[tuple[str, dict[str, object]]] = []
         self._supervisor = Supervisor(plan.limits, self._emit)
+        self._guard = Guard(self._supervisor)
+        self._steering = Steering(plan.controller, self._guard, self._emit)
         self._identified: IdentifierBelief = plan.identifier.start()
         self._foreseen: IdentifierBelief | None = None
         self._holding = Holding()
-        self._control: Any = plan.controller.start()
         self._t_s: float | None = None
         self._manual_power = 0.0
         self._command = Command(0.0, -math.inf, "start")
@@ -163,10 +162,12 @@ class Regulator:
         self._identify(temperature_c, self._given(applied, interval_s), t_s)
         seen_s = self._limits.seen_s(interval_s)
         self._holding = self._holding.after(temperature_c - self._setpoint_c, applied, seen_s)
-        situation = self._situation(t_s, interval_s, applied)
-        beliefs = self._beliefs(situation)
+        situation = self._situation(t_s, interval_s, temperature_c, applied)
+        self._steering.observe(situation)
+        beliefs = self._steering.beliefs(situation, self._holding.known)
         state = self._supervisor.rule(t_s, self._ride_s(situation, beliefs))
         asked, reason = self._ask(situation, state, beliefs)
+        self._steering.tell_remarks(t_s)
         self._command = self._supervisor.bound(asked, reason, t_s)
         self._notice_unknown_power(t_s)
         self._applied = None
@@ -238,14 +239,16 @@ class Regulator:
             return after, foreseen, math.isfinite(float(estimate.theta.sum() + estimate.P.sum()))
 
         kept: tuple[IdentifierBelief, IdentifierBelief | None, bool] = (before, None, True)
-        after, self._foreseen, finite = self._guarded(learn, kept, "estimator.failed", t_s)
+        after, self._foreseen, finite = self._guard.call(learn, kept, "estimator.failed", t_s)
         if finite:
             self._identified = after
         else:
             text = "expected finite parameters, went back to the last good ones"
             self._supervisor.fail("estimator.reset", 11, text, t_s)
 
-    def _situation(self, t_s: float, interval_s: float, applied: float) -> Situation:
+    def _situation(
+        self, t_s: float, interval_s: float, measured_c: float, applied: float
+    ) -> Situation:
         known = self._identified if self._foreseen is None else self._foreseen
         return Situation(
             t_s,
@@ -256,19 +259,14 @@ class Regulator:
             known.estimate,
             known.y_past_c,
             known.u_past,
+            measured_c,
         )
 
     def _ride_s(self, situation: Situation, beliefs: Beliefs) -> float:
         """Return how long the model may steer without a sensor: 0 until it is known."""
-        known = is_finite_number(beliefs.holding_power) and math.isfinite(situation.temperature_c)
-        if not known or self._mode is not Mode.AUTO:
+        if self._mode is not Mode.AUTO:
             return 0.0
-        return self._guarded(
-            lambda: clamp(self._plan.controller.ride_s, 0.0, self._limits.RIDE_S),
-            0.0,
-            "controller.failed",
-            situation.t_s,
-        )
+        return self._steering.ride_s(situation, beliefs, self._limits.RIDE_S)
 
     def _ask(self, situation: Situation, state: State, beliefs: Beliefs) -> tuple[object, str]:
         """Return the power that mode, state and controller ask for, and who asked."""
@@ -283,47 +281,11 @@ class Regulator:
             return 0.0, state.value
         if not math.isfinite(situation.temperature_c):
             return 0.0, "unknown"
-        asked = self._decide(situation)
+        asked = self._steering.decide(situation)
         if state is State.RIDE and is_finite_number(asked):
             holding = clamp(beliefs.holding_power or 0.0, 0.0, 1.0)
             return clamp(float(asked), 0.0, holding), "ride"  # type: ignore[arg-type]
         return asked, "control"
-
-    def _decide(self, situation: Situation) -> object:
-        before = self._control
-
-        def decide() -> tuple[Any, object]:
-            after, asked = self._plan.controller.decide(before, situation)
-            return after, asked
-
-        failed: tuple[Any, object] = (before, 0.0)
-        self._control, asked = self._guarded(decide, failed, "controller.failed", situation.t_s)
-        return asked
-
-    def _beliefs(self, situation: Situation) -> Beliefs:
-        """Return the controller's words; where its model is vague, holding power as observed."""
-
-        def observed() -> Beliefs:
-            beliefs = self._plan.controller.beliefs(self._control, situation)
-            if beliefs.holding_power is None and self._holding.known is not None:
-                return replace(beliefs, holding_power=self._holding.known)
-            return beliefs
-
-        return self._guarded(observed, Beliefs(), "controller.failed", situation.t_s)
-
-    def _guarded(self, call: Callable[[], T], otherwise: T, code: str, t_s: float) -> T:
-        """Return what a law returns; one that raises costs power 0 in this cycle, never the loop.
-
-        Laws come from entry points, so anything may come out of them: this is the one place below
-        the loop where every exception is caught.
-        """
-        try:
-            return call()
-        except Exception as error:  # noqa: BLE001 - the boundary to third-party laws
-            text = f"expected a result, got {type(error).__name__}: {error}"
-            self._emit(code, text=text, trace=traceback.format_exc())
-            self._supervisor.fail(code, 58, text, t_s)
-            return otherwise
 
     def _notice_unknown_power(self, t_s: float) -> None:
         if self._command.reason != "output.nan":
@@ -331,7 +293,7 @@ class Regulator:
             return
         self._unknown_powers += 1
         if self._unknown_powers == 1:
-            self._emit("output.nan", controller=self._plan.controller.name)
+            self._emit("output.nan", controller=self._steering.name)
         if self._unknown_powers >= _NAN_IN_A_ROW:
             text = f"expected a power, got {self._unknown_powers} in a row that are none"
             self._supervisor.fail("output.nan", 11, text, t_s)
@@ -346,7 +308,7 @@ class Regulator:
             state=self._supervisor.state,
             setpoint_c=self._setpoint_c,
             command=self._command,
-            controller=self._plan.controller.name,
+            controller=self._steering.name,
             estimate=self._identified.estimate,
             beliefs=beliefs,
             alarms=self._supervisor.alarms.rows(),

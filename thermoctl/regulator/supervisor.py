@@ -173,9 +173,14 @@ class Supervisor:
             f"sensor.{self.verdict.value}",
         )
 
-    def fail(self, code: str, fault: int | None, text: str, t_s: float) -> None:
-        """Go to SAFE for the fault `code`; good readings for 30 s end it."""
-        self._raise(code, fault, text, t_s)
+    def fail(
+        self, code: str, fault: int | None, text: str, t_s: float, trace: str | None = None
+    ) -> None:
+        """Go to SAFE for the fault `code`; good readings for 30 s end it.
+
+        The event comes once while the alarm is active, with a `trace` if there is one.
+        """
+        self._raise(code, fault, text, t_s, trace=trace)
         self._good_s = 0.0
         if self.state is not State.LATCHED:
             self._enter(State.SAFE, code)
@@ -251,10 +256,16 @@ class Supervisor:
     # -- words -----------------------------------------------------------------------------------
 
     def _raise(
-        self, code: str, fault: int | None, text: str, t_s: float, priority: int = 1
+        self,
+        code: str,
+        fault: int | None,
+        text: str,
+        t_s: float,
+        priority: int = 1,
+        trace: str | None = None,
     ) -> None:
         if self.alarms.set(Alarm(code, fault, priority, t_s, text)):
-            self._emit(code, text=text)
+            self._emit(code, text=text, **({} if trace is None else {"trace": trace}))
 
     def _enter(self, state: State, why: str) -> None:
         if state is not self.state:

@@ -237,7 +237,8 @@ def test_holding_power_is_a_power():
 
 @pytest.mark.parametrize(("reference_time_s", "ride_s"), [(0.0, 0.0), (40.0, 40.0), (90.0, 60.0)])
 def test_it_may_steer_without_a_sensor_for_three_lags_up_to_a_minute(reference_time_s, ride_s):
-    assert SelfTuningMinimumVariance(KnownGain(B), reference_time_s).ride_s == ride_s
+    law = SelfTuningMinimumVariance(KnownGain(B), reference_time_s)
+    assert law.ride_s(law.start()) == ride_s
 
 
 @pytest.mark.parametrize(

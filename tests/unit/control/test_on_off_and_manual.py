@@ -47,9 +47,12 @@ def test_manual_gives_its_power_whatever_the_temperature():
 
 
 @pytest.mark.parametrize("law", [OnOff(), Manual()])
-def test_neither_believes_anything_nor_steers_without_a_sensor(law):
-    assert law.beliefs(law.start(), at(30.0)) == Beliefs()
-    assert law.ride_s == 0.0
+def test_neither_believes_or_remarks_anything_nor_steers_without_a_sensor(law):
+    belief = law.observe(law.start(), at(30.0))
+    assert belief == law.start()
+    assert law.beliefs(belief, at(30.0)) == Beliefs()
+    assert law.remarks(belief) == {}
+    assert law.ride_s(belief) == 0.0
 
 
 @pytest.mark.parametrize(

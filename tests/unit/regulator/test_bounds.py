@@ -21,10 +21,18 @@ class Always:
 
     power: float | Exception
     name: ClassVar[str] = "always"
-    ride_s: ClassVar[float] = 0.0
 
     def start(self):
         return None
+
+    def observe(self, belief, situation):
+        return belief
+
+    def ride_s(self, belief):
+        return 0.0
+
+    def remarks(self, belief):
+        return {}
 
     def decide(self, belief, situation):
         if isinstance(self.power, Exception):

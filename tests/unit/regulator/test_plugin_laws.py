@@ -23,10 +23,15 @@ class Odd:
     believes: Any = HOLDING
     rides: Any = 30.0
     learns: Any = None
+    observes: Any = None
+    remarked: Any = ()
     name: ClassVar[str] = "odd"
 
     def start(self):
         return None
+
+    def observe(self, belief, situation):
+        return _answer(self.observes, belief, situation)
 
     def decide(self, belief, situation):
         return self.decides
@@ -34,14 +39,21 @@ class Odd:
     def beliefs(self, belief, situation):
         return self.believes
 
-    @property
-    def ride_s(self):
-        if isinstance(self.rides, Exception):
-            raise self.rides
-        return self.rides
+    def ride_s(self, belief):
+        return _answer(self.rides, belief)
+
+    def remarks(self, belief):
+        return {} if self.remarked == () else _answer(self.remarked, belief)
 
     def update(self, belief, phi, y):
         return self.learns
+
+
+def _answer(told, *arguments):
+    """Return what was told, or what it makes of the arguments; raise it if it is an error."""
+    if isinstance(told, Exception):
+        raise told
+    return told(*arguments) if callable(told) else told
 
 
 def plan() -> Plan:
@@ -63,6 +75,9 @@ def see(subject, t_s, quality=Quality.GOOD):
         Odd(decides=(None, True)),
         Odd(believes=None),
         Odd(believes=0.3),
+        Odd(observes=RuntimeError("eyes shut")),
+        Odd(remarked=None),
+        Odd(remarked=RuntimeError("no words")),
     ],
     ids=repr,
 )
@@ -121,3 +136,12 @@ def test_a_quality_of_any_kind_is_no_exception(quality):
     subject = Regulator(plan())
     see(subject, 0)
     assert 0.0 <= subject.step(Measurement(1.0, 37.4, quality)).command.power <= 1.0
+
+
+def test_a_failure_that_lasts_is_told_once_and_not_every_second():
+    subject = Regulator(replace(plan(), controller=Odd(observes=RuntimeError("eyes shut"))))
+    events = [event for t in range(20) for event in see(subject, t).events]
+    failed = [event for event in events if event.name == "controller.failed"]
+    assert len(failed) == 1
+    assert "eyes shut" in failed[0].fields["text"]
+    assert "RuntimeError" in failed[0].fields["trace"]
