@@ -75,8 +75,9 @@ class LainiotisBank:
         L = S_\tau^{-1/2} \exp\bigl(-e_\tau^2 / (2 S_\tau)\bigr)
 
     A bank never changes: `update` returns the next one. The prior is uniform, the past before the
-    first sample 0. After each sample probabilities below `floor` are raised to it, all are
-    divided by their sum, and what results is both `posterior` and the prior of the next sample.
+    first sample 0 unless `remember` fills it. After each sample probabilities below `floor` are
+    raised to it, all are divided by their sum, and what results is both `posterior` and the prior
+    of the next sample.
 
     Parameters
     ----------
@@ -206,6 +207,31 @@ class LainiotisBank:
                 u_past,
                 float(before.posterior @ predictions),  # ALF (5)
             )
+        )
+
+    def remember(self, y: float, u: float) -> LainiotisBank:
+        """Return the bank with one more sample in its past, of which nothing is learned.
+
+        For the first samples of a record and those after a gap, whose own past is not known: with
+        as many as the longest regressor reaches back, no candidate is judged by a past of zeros.
+
+        Parameters
+        ----------
+        y, u : float
+            As in `update`; where one is not finite, the bank comes back with ``rejected`` true.
+
+        Raises
+        ------
+        ValueError
+            `y` or `u` is no number.
+        """
+        y, u = _scalar("y", y), _scalar("u", u)
+        before = self._belief
+        if not (abs(y) < PAST_LIMIT and abs(u) < PAST_LIMIT):  # false for NaN
+            return self._with(before.marked())
+        y_past, u_past = pushed(before.y_past, y), pushed(before.u_past, u)
+        return self._with(
+            replace(before, y_past=y_past, u_past=u_past, prediction=math.nan, rejected=False)
         )
 
     def _with(self, belief: _Belief) -> LainiotisBank:
