@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,8 @@ from thermoctl.estimation import RecursiveLeastSquares, start
 from thermoctl.model.arx import Arx
 from thermoctl.quantities import Array
 from thermoctl.studies.laws import LawSpec, prepare
-from thermoctl.studies.record import LARGEST, Record, RecordError
+from thermoctl.studies.record import Record, RecordError
+from thermoctl.studies.scaled import Scaled, Scaling, robust_variance
 from thermoctl.studies.whiteness import FEWEST_SAMPLES, ljung_box
 
 NOISE_FORGETTING = 0.95
@@ -36,8 +37,6 @@ BEYOND = 10.0
 
 _LEARNING = 20
 _LEARNING_SHARE = 0.1
-_MAD = 1.4826
-_BLOCK = 4_096
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,45 +187,11 @@ def replay(
     return Replay(record, conditions, *zip(*runs, strict=True))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Scaled:
-    """The record as the laws see it: regressors are made in blocks, never all at once."""
-
-    y: Array
-    u: Array
-    order: Arx
-    whole: npt.NDArray[np.intp]
-
-    @classmethod
-    def of(cls, record: Record, y: Array, u: Array, order: Arx) -> _Scaled:
-        """Keep the samples whose past reaches back far enough without a gap."""
-        past = np.arange(len(y)) - record.stretch_start
-        reach = max(1, order.y_memory, order.u_memory)
-        return cls(y, u, order, np.flatnonzero(past >= reach))
-
-    def samples(self) -> Iterator[tuple[int, Array, float]]:
-        """Yield index, regressor and output of every sample with a whole past."""
-        back_y = np.arange(1, self.order.n + 1)
-        back_u = self.order.delay + np.arange(self.order.m)
-        for begin in range(0, len(self.whole), _BLOCK):
-            block = self.whole[begin : begin + _BLOCK]
-            phi = np.hstack(  # O21 (1)
-                (-self.y[block[:, None] - back_y], self.u[block[:, None] - back_u])
-            )
-            yield from zip(block.tolist(), phi, self.y[block].tolist(), strict=True)
-
-
-def _prepare(record: Record, order: Arx, P0: float, keep_mean: bool) -> tuple[_Scaled, Conditions]:
+def _prepare(record: Record, order: Arx, P0: float, keep_mean: bool) -> tuple[Scaled, Conditions]:
     """Centre and scale, and decide from where on predictions count."""
-    y_centre, y_scale = (0.0, 1.0) if keep_mean else _centre_and_scale(record.y)
-    u_centre, u_scale = (0.0, 1.0) if keep_mean else _centre_and_scale(record.u)
-    if not _moves(record.y):
-        raise RecordError(
-            f"{record.source}: expected an output that changes,"
-            f" {record.names.output} is {record.y[0]:g} throughout"
-        )
-    y, u = (record.y - y_centre) / y_scale, (record.u - u_centre) / u_scale
-    scaled = _Scaled.of(record, y, u, order)
+    scaling = Scaling.of(record, keep_mean=keep_mean)
+    y = scaling.outputs(record)
+    scaled = Scaled.of(record, y, scaling.inputs(record), order)
     whole = len(scaled.whole)
     learning = min(_LEARNING * (order.n + order.m), int(_LEARNING_SHARE * whole))
     if whole - learning < FEWEST_SCORED:
@@ -239,10 +204,10 @@ def _prepare(record: Record, order: Arx, P0: float, keep_mean: bool) -> tuple[_S
     return scaled, Conditions(
         order=order,
         mean_removed=not keep_mean,
-        y_centre=y_centre,
-        y_scale=y_scale,
-        u_centre=u_centre,
-        u_scale=u_scale,
+        y_centre=scaling.y_centre,
+        y_scale=scaling.y_scale,
+        u_centre=scaling.u_centre,
+        u_scale=scaling.u_scale,
         R2=math.nan,
         R2_source="",
         P0=P0,
@@ -252,22 +217,10 @@ def _prepare(record: Record, order: Arx, P0: float, keep_mean: bool) -> tuple[_S
     )
 
 
-def _centre_and_scale(values: Array) -> tuple[float, float]:
-    """Return mean and standard deviation; scale 1 for what never changes."""
-    return float(np.mean(values)), float(np.std(values)) if _moves(values) else 1.0
-
-
-def _moves(values: Array) -> bool:
-    """Return whether `values` change, and by enough for their squares to be numbers."""
-    return bool(np.ptp(values) > 0.0 and np.std(values) > 1.0 / LARGEST)
-
-
-def _noise(scaled: _Scaled, conditions: Conditions) -> float:
+def _noise(scaled: Scaled, conditions: Conditions) -> float:
     """Return the noise variance in the unit of the output squared.
 
-    The spread is 1.4826 times the median of the errors, which a few outliers hardly move; each
-    error is divided by what the uncertainty of the parameters adds to it. A quantised record that
-    hardly moves has a median of zero: then the variance of one quantum stands in.
+    Each error of the first pass is divided by what the uncertainty of the parameters adds to it.
     """
     law = RecursiveLeastSquares(forgetting=NOISE_FORGETTING)
     belief = start(conditions.order.n + conditions.order.m, P0=conditions.P0)
@@ -277,14 +230,11 @@ def _noise(scaled: _Scaled, conditions: Conditions) -> float:
         if index >= conditions.scored_from and not belief.rejected:
             added = belief.innovation_var + 1.0 - NOISE_FORGETTING
             errors.append(abs(belief.innovation) / math.sqrt(added))
-    spread = _MAD * float(np.median(errors)) if errors else 0.0
-    moves = np.abs(np.diff(scaled.y))
-    quantum = float(np.min(moves[moves > 0.0]))
-    return max(spread**2, quantum**2 / 12.0) * conditions.y_scale**2
+    return robust_variance(np.array(errors), scaled.y) * conditions.y_scale**2
 
 
 def _run(
-    scaled: _Scaled, conditions: Conditions, spec: LawSpec, timer: Callable[[], float]
+    scaled: Scaled, conditions: Conditions, spec: LawSpec, timer: Callable[[], float]
 ) -> tuple[Score, Trace]:
     """Take the record through one law."""
     prepared = prepare(
@@ -324,7 +274,7 @@ def _run(
     return score, trace
 
 
-def _gave_up(trace: Trace, scaled: _Scaled, conditions: Conditions) -> int | None:
+def _gave_up(trace: Trace, scaled: Scaled, conditions: Conditions) -> int | None:
     """Return the first sample from which on a law that ran away is not worth looking at."""
     reach = BEYOND * conditions.y_scale * float(np.ptp(scaled.y))
     late = trace.index >= conditions.scored_from
@@ -335,7 +285,7 @@ def _gave_up(trace: Trace, scaled: _Scaled, conditions: Conditions) -> int | Non
 
 
 def _score(
-    name: str, scaled: _Scaled, conditions: Conditions, trace: Trace, update_s: float
+    name: str, scaled: Scaled, conditions: Conditions, trace: Trace, update_s: float
 ) -> Score:
     """Judge the predictions from `scored_from` on."""
     counted = scaled.whole[scaled.whole >= conditions.scored_from]
