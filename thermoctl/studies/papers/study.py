@@ -84,3 +84,9 @@ def at_least_one(name: str, value: int) -> None:
     """Raise ``ValueError`` unless `value` is an integer of 1 or more."""
     if isinstance(value, bool) or not isinstance(value, int) or value < 1:
         raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
+
+
+def not_negative(name: str, value: int) -> None:
+    """Raise ``ValueError`` unless `value` is an integer of 0 or more."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ValueError(f"{name} must be an integer of at least 0, got {value!r}")
