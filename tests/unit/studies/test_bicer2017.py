@@ -10,6 +10,7 @@ import pytest
 from thermoctl.studies import figure as house
 from thermoctl.studies.papers import bicer2017
 from thermoctl.studies.papers.bicer2017 import Bicer2017, exact_model, table_1
+from thermoctl.studies.papers.study import generator
 
 HKT = {
     "Kalman filter": 384.4,
@@ -75,6 +76,17 @@ def test_the_first_sum_is_that_of_the_two_errors_of_a_single_run(three):
     for name, line in first["1"]["values"].items():
         squares = line[0] ** 2 + first["2"]["values"][name][0] ** 2
         assert first["5"]["values"][name][0] == pytest.approx(squares, rel=1e-12)
+
+
+def test_errors_and_factors_are_means_over_the_runs(three):
+    runs = [table_1().replicate(generator(1, replication)) for replication in range(2)]
+    error = np.mean([run["Filter 1"].error for run in runs], axis=0)
+    fading = np.mean([run["Filter 1"].fading for run in runs], axis=0)
+    figures = three[1].figures
+    for column, number in enumerate("12"):
+        values = figures[number]["values"]["Filter 1"]
+        np.testing.assert_allclose(values, error[:, column], rtol=1e-12)
+    np.testing.assert_allclose(figures["3"]["values"]["s2"], fading[:, 1], rtol=1e-12)
 
 
 def test_an_error_is_the_state_less_its_estimate(three):
