@@ -30,7 +30,7 @@ _COMMANDS: Final = {
     "doctor": "thermoctl.app.board_commands:doctor",
     "simulate": "thermoctl.app.board_commands:simulate",
     "replay": "thermoctl.app.study_commands:replay_command",
-    "reproduce": "thermoctl.app.study_commands:reproduce",
+    "reproduce": "thermoctl.app.reproduce_commands:reproduce",
 }
 
 

@@ -46,6 +46,33 @@ class Speed(click.ParamType):  # type: ignore[type-arg]
         return speed
 
 
+class Parsed(click.ParamType):  # type: ignore[type-arg]
+    """A word that `parse` understands, or refuses with a ValueError that says why."""
+
+    def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
+        self.name = name
+        self._parse = parse
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return self._parse(value)
+        except ValueError as problem:
+            self.fail(str(problem), param, ctx)
+
+
+def positive_number(text: str) -> float:
+    """Return a number greater than zero; ``ValueError`` if it is none."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise ValueError(f"expected a number greater than zero, got {text!r}")
+    return value
+
+
 DURATION, SPEED = Duration(), Speed()
 FILE = click.Path(path_type=Path, readable=False)
 """A file that whoever reads it reports on; click would call a missing right wrong usage."""

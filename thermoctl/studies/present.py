@@ -18,11 +18,11 @@ from thermoctl.studies.record import Record
 from thermoctl.studies.replay import Replay
 from thermoctl.studies.words import ascii_only, duration, is_utf8, number, probability
 
-_Spell = Callable[[str], str]
+Spelling = Callable[[str], str]
 """Turns words into those that the console can show; before they are laid out in columns."""
 
 
-def _spell(console: Console) -> _Spell:
+def spelling(console: Console) -> Spelling:
     """Return how words are spelt on `console`."""
     return str if is_utf8(console.encoding) else ascii_only
 
@@ -68,11 +68,11 @@ def _finite(value: Any) -> Any:
 
 def print_replay(console: Console, result: Replay) -> None:
     """Print what was read, what was done to it, and how every law did."""
-    spell = _spell(console)
+    spell = spelling(console)
     for line in (*_about_record(result.record), *_about_conditions(result)):
         console.print(spell(line), style="none", markup=False, soft_wrap=True)
-    _print_table(console, _prediction_table(result, spell))
-    _print_table(console, *_parameter_tables(result, spell))
+    print_table(console, _prediction_table(result, spell))
+    print_table(console, *_parameter_tables(result, spell))
     console.print()
     for line in _warnings(result):
         console.print(spell(line), markup=False, soft_wrap=True)
@@ -105,7 +105,7 @@ def _about_conditions(result: Replay) -> list[str]:
     ]
 
 
-def _table(spell: _Spell, *headings: str) -> Table:
+def empty_table(spell: Spelling, *headings: str) -> Table:
     """Return an empty table: the first column words, the others figures."""
     table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0), header_style="bold")
     for place, heading in enumerate(headings):
@@ -113,9 +113,9 @@ def _table(spell: _Spell, *headings: str) -> Table:
     return table
 
 
-def _prediction_table(result: Replay, spell: _Spell) -> Table:
+def _prediction_table(result: Replay, spell: Spelling) -> Table:
     """Return how well each law foresaw the output."""
-    table = _table(spell, "\nestimator", "\nrms error", "\nR²", "whiteness\np", "µs a\nsample")
+    table = empty_table(spell, "\nestimator", "\nrms error", "\nR²", "whiteness\np", "µs a\nsample")
     for score in result.scores:
         figures = (
             _figure(score.rms_error, ".4f"),
@@ -135,23 +135,23 @@ def _figure(value: float, form: str) -> str:
     return f"{value:{'.2e' if large else form}}".replace("-", "−")
 
 
-def _parameter_tables(result: Replay, spell: _Spell) -> tuple[Table, Table]:
+def _parameter_tables(result: Replay, spell: Spelling) -> tuple[Table, Table]:
     """Return the last parameters of each law: a row for each law, or one for each parameter."""
     names = parameter_names(result.conditions.order)
     cells = [
         [spell(number(value, sd)) for value, sd in zip(score.theta, score.theta_sd, strict=True)]
         for score in result.scores
     ]
-    wide = _table(spell, "parameters ± 2σ", *names)
+    wide = empty_table(spell, "parameters ± 2σ", *names)
     for score, row in zip(result.scores, cells, strict=True):
         wide.add_row(score.name, *row)
-    tall = _table(spell, "parameters ± 2σ", *(score.name for score in result.scores))
+    tall = empty_table(spell, "parameters ± 2σ", *(score.name for score in result.scores))
     for name, column in zip(names, zip(*cells, strict=True), strict=True):
         tall.add_row(name, *column)
     return wide, tall
 
 
-def _print_table(console: Console, table: Table, otherwise: Table | None = None) -> None:
+def print_table(console: Console, table: Table, otherwise: Table | None = None) -> None:
     """Print a table after an empty line, whole; the narrower one where the terminal is narrow."""
     roomy = console.options.update(width=10_000)
     widths = [Measurement.get(console, roomy, each).maximum for each in (table, otherwise or table)]
@@ -199,7 +199,7 @@ def _whiteness_words(result: Replay) -> list[str]:
 
 def print_experiment(console: Console, title: str, measures: Measures) -> None:
     """Print the measures of an experiment, each with its unit."""
-    spell = _spell(console)
+    spell = spelling(console)
     console.print(spell(title), markup=False, soft_wrap=True)
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_header=False)
     table.add_column(no_wrap=True)
