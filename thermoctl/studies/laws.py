@@ -7,12 +7,14 @@ Constants are in the scaled variables of the replay, except where they are pure 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from thermoctl.estimation import (
     CorrectedKalman,
+    Order,
     RandomWalkKalman,
     RecursiveLeastSquares,
     VariableForgetting,
@@ -23,6 +25,13 @@ from thermoctl.ports import Estimator
 from thermoctl.signals import Estimate
 
 EXAMPLES = "ckf, nkf, nkf:R1=1e-6, rls, rls:0.98, vff, vff:10"
+
+
+AUTO = "auto"
+"""The word for an order that the record is to choose."""
+
+FARTHEST = 200
+"""Samples a candidate may look back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +107,57 @@ def parse_order(text: str) -> Arx:
     except ValueError:
         raise ValueError(f"expected n,m,d such as 2,2,1; got {text!r}") from None
     return Arx(n, m, delay)
+
+
+def parse_order_or_auto(text: str) -> Arx | None:
+    """Return what `parse_order` returns, or None for ``auto``.
+
+    Raises
+    ------
+    ValueError
+        If it is neither.
+    """
+    if text.strip().lower() == AUTO:
+        return None
+    try:
+        return parse_order(text)
+    except ValueError as problem:
+        raise ValueError(
+            str(problem).replace("expected n,m,d", f"expected {AUTO} or n,m,d")
+        ) from None
+
+
+def parse_candidates(text: str) -> tuple[Order, ...]:
+    """Return the orders `text` names: ``n,m,delay``, each a number or a range ``1-3``.
+
+    Raises
+    ------
+    ValueError
+        If it is not three of them, out of range, or too many.
+    """
+    words = text.split(",")
+    try:
+        n, m, delay = (_numbers(word) for word in words)
+    except ValueError:
+        raise ValueError(
+            f"expected n,m,d or ranges of them, such as 2,1,3 or 1-3,1-2,1-8; got {text!r}"
+        ) from None
+    if n[-1] > FARTHEST or delay[-1] + m[-1] - 1 > FARTHEST:
+        raise ValueError(
+            f"expected orders that reach back {FARTHEST} samples at most, got {text!r}"
+        )
+    return tuple(Order(*each) for each in itertools.product(n, m, delay))
+
+
+def _numbers(text: str) -> range:
+    """Return the numbers of ``3`` or ``1-3``; raise ``ValueError`` if it is neither."""
+    low, dash, high = text.strip().partition("-")
+    if not (low.isdecimal() and (high.isdecimal() or not dash)):
+        raise ValueError(text)
+    numbers = range(int(low), int(high or low) + 1)
+    if not numbers:
+        raise ValueError(text)
+    return numbers
 
 
 def parameter_names(order: Arx) -> tuple[str, ...]:
