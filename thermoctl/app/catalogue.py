@@ -21,7 +21,7 @@ from thermoctl.app.tables import EstimatorTable, LoopTable
 from thermoctl.app.toml_text import toml_value
 from thermoctl.app.units import unit_of
 
-INJECTED = ("structure",)
+INJECTED = ("period_s", "structure")
 """What the composer gives to a law; never an option."""
 
 _WORDS = {

@@ -1,0 +1,198 @@
+"""The bank against a plain one: one filter after the other, matrix by matrix."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from thermoctl.control.adaptive.bank import Bank
+from thermoctl.control.adaptive.coasting import FASTEST_PERIODS, power_for
+
+SHAPES = [(0.18, 0.31, 0.51), (0.10, 0.75, 0.15)]
+
+
+@dataclass
+class Filter:
+    """One hypothesis, with everything in K, s and per second."""
+
+    lag_s: float
+    shape: tuple[float, float, float]
+    h: float
+    q: float = 0.0
+    ln_w: float = 0.0
+    x: np.ndarray = field(default_factory=lambda: np.zeros(4))
+    P: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
+
+    def __post_init__(self):
+        dead_s, self.t1_s, self.t2_s = (share * self.lag_s for share in self.shape)
+        self.nd = round(dead_s / self.h)
+
+    def begin(self, y):
+        self.x = np.array([y, y, 0.0, 0.002])
+        self.P = np.diag([1.0, 1.0, 0.001**2, 0.15**2])
+        self.P[0, 1] = self.P[1, 0] = 0.98
+
+    def advance(self, powers):
+        self.q += (1.0 - math.exp(-self.h / self.t1_s)) * (powers[self.nd] - self.q)
+
+    def predict(self):
+        a = 1.0 - math.exp(-self.h / self.t2_s)
+        F = np.array([[1, 0, -self.h, self.h * self.q], [a, 1 - a, 0, 0], [0, 0, 1, 0],
+                      [0, 0, 0, 1]])  # fmt: skip
+        b = max(self.x[3], 1e-4)
+        noise = [(0.06 * b) ** 2, 0.003**2, (0.0015 * b) ** 2, (2e-4 * b) ** 2]
+        self.x = F @ self.x
+        self.P = F @ self.P @ F.T + self.h * np.diag(noise)
+
+    def inflate(self, nu, R):
+        root = math.sqrt(max(1.0, nu**2 / (self.P[1, 1] + R)))
+        D = np.diag([root, root, 1.0, 1.0])
+        self.P = D @ self.P @ D
+
+    def correct(self, y, R, u_min, limit_loss):
+        S, nu = self.P[1, 1] + R, y - self.x[1]
+        K = self.P[:, 1] / S
+        self.x = self.x + K * nu
+        self.P = self.P - np.outer(K, self.P[1])
+        self.P = (self.P + self.P.T) / 2
+        self.x[3] = min(max(self.x[3], 2e-5), 0.5)
+        if limit_loss:
+            self.x[2] = min(max(self.x[2], (u_min - 0.5) * self.x[3]), 0.95 * self.x[3])
+        return nu, S
+
+    def coasting(self, powers, u_min, u_max):
+        T, _, d, beta = self.x
+        u_ss = min(max(d / beta, u_min), u_max)
+        under_way = sum(powers[i] - u_ss for i in range(self.nd))
+        return u_ss, T + beta * (self.t1_s * (self.q - u_ss) + self.h * under_way), self.lag_s, beta
+
+
+class PlainBank:
+    """The recipe step by step, and nothing but it."""
+
+    def __init__(self, h=1.0, u_min=0.0, u_max=1.0, kappa=0.6):
+        self.h, self.u_min, self.u_max, self.kappa = h, u_min, u_max, kappa
+        lags = [3.0 * 50.0 ** (i / 15.0) for i in range(16)]
+        self.filters = [Filter(lag_s, shape, h) for lag_s in lags for shape in SHAPES]
+        self.powers = [0.0] * 4000
+        self.R_hat, self.u_mean, self.n, self.k = 0.001, 0.0, 0, -1
+        self.y1 = self.y2 = math.nan
+        self.outside, self.silent_until_s = 0, -math.inf
+
+    def step(self, y, applied, r):
+        u = min(max(applied, self.u_min), self.u_max)
+        self.powers = [u, *self.powers[:-1]]
+        valid = math.isfinite(y)
+        e = min(max((abs(u - self.u_mean) - 0.05) / 0.05, 0.0), 1.0)
+        self.u_mean += min(0.02 * self.h, 1.0) * (u - self.u_mean)
+        for each in self.filters:
+            each.advance(self.powers)
+        if self.k < 0 and not valid:
+            return 0.0
+        if self.k < 0:
+            for each in self.filters:
+                each.begin(y)
+        self.k += 1
+        for each in self.filters:
+            each.predict()
+        if valid:
+            self.meet(y, e)
+        return self.decide(r)
+
+    def meet(self, y, e):
+        if self.n >= 2:
+            second = min((y - 2 * self.y1 + self.y2) ** 2 / 6, 9 * max(self.R_hat, 0.001))
+            self.R_hat += (second - self.R_hat) * max(0.005, 1 / (self.n + 5))
+        self.y1, self.y2 = y, self.y1
+        R = max(self.R_hat, 1e-5)
+        self.n += 1
+        likeliest = max(self.filters, key=lambda each: each.ln_w)  # the first of equals
+        nu_m = y - likeliest.x[1]
+        if self.n - 1 >= 20 and nu_m**2 > 25 * (likeliest.P[1, 1] + R):
+            self.outside += 1
+        else:
+            self.outside = 0
+        if self.outside in (1, 2):
+            return
+        jumped = self.outside > 2
+        if jumped:
+            self.silent_until_s = self.k * self.h + 5 * likeliest.lag_s
+        heard = not jumped and self.k >= 4 and self.k * self.h >= self.silent_until_s
+        for each in self.filters:
+            if jumped:
+                each.inflate(nu_m, R)
+            nu, S = each.correct(y, R, self.u_min, self.k * self.h > 60)
+            if heard:
+                each.ln_w -= 0.5 * e * (math.log(S) + min(nu**2 / S, 9))
+        best = max(each.ln_w for each in self.filters)
+        for each in self.filters:
+            each.ln_w = max(each.ln_w - best, -30.0)
+
+    def decide(self, r):
+        w = np.exp([each.ln_w for each in self.filters])
+        rows = [each.coasting(self.powers, self.u_min, self.u_max) for each in self.filters]
+        u_ss, coasting, lag, beta = w @ np.array(rows) / w.sum()
+        self.told = (u_ss, coasting, lag, beta)
+        Tc = max(3.0, FASTEST_PERIODS * self.h, self.kappa * lag)
+        return min(max(u_ss + (r - coasting) / (beta * Tc), self.u_min), self.u_max)
+
+
+def eventful(samples, h, seed):
+    """Yield readings of a plant with lags that is disturbed in every way; None: what was asked."""
+    rng = np.random.default_rng(seed)
+    T = z = 25.0
+    q, gain, loss = 0.0, 0.036, 0.009 / 37.5
+
+    def reading(k, u):
+        nonlocal T, z, q, gain
+        if k == int(0.45 * samples):
+            T -= 3.3  # cold water
+        if k == int(0.6 * samples):
+            gain *= 2.0  # half the water gone
+        q += (1 - math.exp(-h / 14)) * (u - q)
+        T += h * (gain * q - loss * T) + 0.002 * math.sqrt(h) * rng.standard_normal()
+        z += (1 - math.exp(-h / 6)) * (T - z)
+        y = z + 0.015 * rng.standard_normal()
+        if k < 3 or k % 97 == 40 or 0.3 * samples < k < 0.3 * samples + 15:
+            return math.nan  # gaps, at the start as well
+        return y + (20.0 if k % 131 == 60 else 0.0) + (0.4 if k % 233 in (80, 81) else 0.0)
+
+    return reading
+
+
+@pytest.mark.parametrize(
+    ("h", "u_min", "samples"), [(1.0, 0.0, 2500), (5.0, 0.0, 500), (0.4, -0.3, 600)]
+)
+def test_every_step_is_that_of_filters_run_one_by_one(h, u_min, samples):
+    bank, plain = Bank(h, u_min), PlainBank(h, u_min)
+    belief, reading = bank.start(), eventful(samples, h, seed=7)
+    u, jumps, saturated, largest = 0.0, 0, 0, 0.0
+    for k in range(samples):
+        r = 37.5 if k < 0.8 * samples else 40.0
+        y = reading(k, u)
+        applied = u + 0.7 * (0.5 * samples < k < 0.5 * samples + 9)  # not what was asked for
+        belief = bank.observe(belief, y, applied)
+        expected = plain.step(y, applied, r)
+        if belief.outlook is None:
+            assert expected == 0.0
+            continue
+        u = power_for(belief.outlook, r, 0.6, h, bank.bounds)
+        jumps += belief.gate.jumped
+        saturated += u in bank.bounds
+        told = (belief.outlook.holding_power, belief.outlook.coasting_c, belief.outlook.lag_s,
+                belief.outlook.gain)  # fmt: skip
+        largest = max(largest, abs(u - expected), *np.abs(np.subtract(told, plain.told)))
+        scale = np.array([1.0, 1.0, h, h])
+        P = np.array([each.P for each in plain.filters]).transpose(1, 2, 0)
+        x = np.array([each.x for each in plain.filters]).T
+        largest = max(
+            largest,
+            np.abs(belief.block[:, :4] - P * np.multiply.outer(scale, scale)[..., None]).max(),
+            np.abs(belief.block[:, 4] - x * scale[:, None]).max(),
+            np.abs(belief.weights.log - [each.ln_w for each in plain.filters]).max(),
+        )
+    print(f"jumps {jumps}, saturated {saturated}, largest difference {largest:.1e}")
+    assert jumps > 0
+    assert saturated > 0
+    assert largest < 1e-9

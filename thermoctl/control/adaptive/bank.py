@@ -1,0 +1,210 @@
+"""The bank of corrected Kalman filters: a reading goes in, a belief comes out.
+
+Nothing is changed in place once it is part of a belief, and what belongs to one is read-only. So a
+belief may be kept, compared, gone back to, and carried on twice, as any other value.
+
+Implements section 9 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from thermoctl.control.adaptive import evidence, filters, path
+from thermoctl.control.adaptive.coasting import Outlook, outlook
+from thermoctl.control.adaptive.evidence import (
+    EVIDENCE_FROM,
+    GATE,
+    GATE_SAMPLES,
+    HOLD_LAGS,
+    Excitation,
+    Gate,
+    Noise,
+    Weights,
+)
+from thermoctl.control.adaptive.filters import X, Z
+from thermoctl.control.adaptive.hypotheses import Hypotheses
+from thermoctl.control.adaptive.path import Path
+from thermoctl.quantities import clamp, is_finite_number
+
+LOSS_FROM_S = 60.0
+"""The loss is limited by the gain from then on: before, the gain is hardly known."""
+BLIND_S = 300.0
+"""Without a reading for so long the filters stand still: what they would go on adding up says
+nothing of the water any more. Gain, loss and weights are kept, water and sensor begin anew."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BankBelief:
+    """What the bank believes after a sample.
+
+    Parameters
+    ----------
+    sample : int
+        Number of the last sample; the first valid reading is 0, and before it is -1.
+    blind : int
+        Samples in a row without a valid reading.
+    excitation, path : Excitation, Path
+        How the power moved, and where it is on its way.
+    noise, gate : Noise, Gate
+        What the readings were like.
+    weights : Weights
+        How likely each hypothesis is.
+    block : ndarray, shape (4, 5, n) or None
+        The filters; None before the first valid reading.
+    outlook : Outlook or None
+        What follows for control; None before the first valid reading.
+    """
+
+    sample: int
+    blind: int
+    excitation: Excitation
+    path: Path
+    noise: Noise
+    gate: Gate
+    weights: Weights
+    block: filters.Block | None = None
+    outlook: Outlook | None = None
+
+    @property
+    def learning(self) -> bool:
+        """Whether the last sample was evidence for or against a lag."""
+        heard = self.blind == 0 and self.gate.outside == 0 and self.excitation.share > 0.0
+        return heard and self.sample >= max(EVIDENCE_FROM, self.gate.silent_until)
+
+
+class Met(NamedTuple):
+    """The part of a belief that readings change."""
+
+    noise: Noise
+    gate: Gate
+    weights: Weights
+    block: filters.Block
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bank:
+    """The law of the bank.
+
+    Parameters
+    ----------
+    period_s : float
+        Time from one sample to the next, .05 to 3,600 s.
+    u_min, u_max : float
+        Least and most power; finite, ``u_min < u_max``, 0 within.
+
+    Raises
+    ------
+    ValueError
+        An argument is outside its range.
+    """
+
+    period_s: float = 1.0
+    u_min: float = 0.0
+    u_max: float = 1.0
+    hypotheses: Hypotheses = field(init=False, repr=False)
+    _drift: filters.Drift = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("u_min", "u_max"):
+            if not is_finite_number(getattr(self, name)):
+                raise ValueError(f"{name} must be a finite number, got {getattr(self, name)!r}")
+        if not self.u_min <= 0.0 < self.u_max:
+            raise ValueError(f"u_min must be at most 0 and u_max above, got {self.bounds}")
+        object.__setattr__(self, "hypotheses", Hypotheses.at_period(self.period_s))
+        object.__setattr__(self, "_drift", filters.Drift(self.period_s))
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Least and most power."""
+        return self.u_min, self.u_max
+
+    def start(self) -> BankBelief:
+        """Return the belief before the first sample."""
+        return BankBelief(
+            -1,
+            0,
+            Excitation(),
+            path.at_rest(self.hypotheses),
+            Noise(),
+            Gate(),
+            evidence.equal(self.hypotheses),
+        )
+
+    def observe(self, belief: BankBelief, y_c: float, applied: float) -> BankBelief:
+        """Return the belief after a period of `applied` that ended with the reading `y_c`.
+
+        Parameters
+        ----------
+        belief : BankBelief
+            The one before.
+        y_c : float
+            Reading in degC; NaN when there is none.
+        applied : float
+            Power that the plant really got; limited to the bounds.
+
+        Raises
+        ------
+        ArithmeticError
+            The result would not be finite; `belief` is still good.
+        """
+        hypotheses, bounds = self.hypotheses, (self.u_min, self.u_max)
+        power = clamp(applied, *bounds)
+        way = path.pushed(belief.path, hypotheses, power)
+        excitation = belief.excitation.after(power, self.period_s)
+        seen = math.isfinite(y_c)
+        if belief.block is None and not seen:
+            return replace(belief, path=way, excitation=excitation)
+        sample, blind = belief.sample + 1, 0 if seen else belief.blind + 1
+        block = self._begun(belief, y_c)
+        if blind * self.period_s <= BLIND_S:
+            block = filters.predicted(block, way.heat, hypotheses.sensor_step, self._drift)
+        met = Met(belief.noise, belief.gate, belief.weights, block)
+        if seen:
+            met = self._met(met, y_c, sample, excitation.share)
+        ahead = outlook(met.block, way, met.weights.share, hypotheses, bounds)
+        if not math.isfinite(np.vdot(met.block, met.block) + ahead.coasting_c):
+            raise ArithmeticError(f"expected a finite belief after {y_c!r} degC at {applied!r}")
+        for array in (met.block, *met.weights[:2], *way):
+            array.setflags(write=False)
+        return BankBelief(sample, blind, excitation, way, *met, ahead)
+
+    def lost(self, belief: BankBelief) -> BankBelief:
+        """Return the belief after a gap in which nobody knows what was applied, if anything."""
+        blind = max(belief.blind, math.ceil(BLIND_S / self.period_s)) + 1
+        return replace(belief, blind=blind, gate=Gate(), path=path.at_rest(self.hypotheses))
+
+    def _begun(self, belief: BankBelief, y_c: float) -> filters.Block:
+        """Return the block to go on from; at the first reading and after a long gap, a new one."""
+        if belief.block is None:
+            return filters.start(self.hypotheses, y_c)
+        if belief.blind * self.period_s > BLIND_S and math.isfinite(y_c):
+            return filters.restarted(belief.block, self.hypotheses, y_c)
+        return belief.block
+
+    def _met(self, before: Met, y_c: float, sample: int, share: float) -> Met:
+        """Return what becomes of the prediction when the reading `y_c` meets it."""
+        noise, gate, weights, block = before
+        noise = noise.after(y_c)
+        R, m = noise.believed, weights.likeliest
+        nu, S_m = y_c - float(block[Z, X, m]), float(block[Z, Z, m]) + R
+        if before.noise.samples >= GATE_SAMPLES and nu * nu > GATE * S_m:
+            hold = HOLD_LAGS * float(self.hypotheses.lag_s[m]) / self.period_s
+            gate = gate.beyond(sample, hold)
+        else:
+            gate = gate.within()
+        if gate.outlier:
+            return Met(noise, gate, weights, block)
+        if gate.jumped:
+            block = filters.inflated(block, nu, R)
+        block, nus, S = filters.corrected(block, y_c, R)
+        filters.project(
+            block, self.hypotheses, self.u_min, loss=sample * self.period_s > LOSS_FROM_S
+        )
+        if share > 0.0 and sample >= max(EVIDENCE_FROM, gate.silent_until):
+            weights = weights.after(share, nus, S)
+        return Met(noise, gate, weights, block)

@@ -1,0 +1,87 @@
+r"""Where the water would come to rest, and the power that follows from it.
+
+.. math::
+
+    T_\infty = T + \beta\,\Bigl[t_1 (q - u_{ss}) + h \sum_{i=0}^{n_d-1} (u_{k-1-i} - u_{ss})\Bigr],
+    \qquad u = u_{ss} + \frac{r - T_\infty}{\beta\, T_c}
+
+All heat that is still under way is in :math:`T_\infty`, taken from the power that was applied. So
+there is nothing to wind up, full power lasts until the last moment, and whoever steered before, the
+law goes on without a bump.
+
+Implements section 9 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from thermoctl.control.adaptive.filters import BETA, Block, D, T, X
+from thermoctl.control.adaptive.hypotheses import Hypotheses
+from thermoctl.control.adaptive.path import Path
+from thermoctl.quantities import Array, clamp
+
+FASTEST_S = 3.0
+"""Tc is no shorter, whatever the lag."""
+FASTEST_PERIODS = 3.0
+"""Nor shorter than so many samples: at one sample any error of the gain would be given back whole,
+and below it the loop would be unstable."""
+
+
+class Outlook(NamedTuple):
+    """What the bank as a whole expects: means over the hypotheses, weighted.
+
+    Parameters
+    ----------
+    coasting_c : float
+        Where the water would come to rest with holding power from now on.
+    holding_power : float
+        Power that makes up for the loss, within the bounds of power.
+    lag_s : float
+        Total lag.
+    gain : float
+        Heating rate at full power in K/s.
+    """
+
+    coasting_c: float
+    holding_power: float
+    lag_s: float
+    gain: float
+
+
+def outlook(
+    block: Block, path: Path, share: Array, hypotheses: Hypotheses, bounds: tuple[float, float]
+) -> Outlook:
+    """Return the weighted means; `bounds` are the least and the most power."""
+    x = block[:, X]
+    beta = x[BETA]
+    means = np.empty((4, len(share)))
+    coasting, holding = means[0], means[1]
+    np.divide(x[D], beta, out=holding)
+    np.maximum(holding, bounds[0], out=holding)
+    np.minimum(holding, bounds[1], out=holding)
+    np.subtract(path.heat, holding, out=coasting)
+    coasting *= hypotheses.element
+    coasting += path.pending
+    coasting -= hypotheses.dead * holding
+    coasting *= beta
+    coasting += x[T]
+    means[2] = hypotheses.lag_s
+    means[3] = beta
+    coasting_c, holding_power, lag_s, gain = means.dot(share).tolist()
+    return Outlook(coasting_c, holding_power, lag_s, gain / hypotheses.period_s)
+
+
+def power_for(
+    outlook: Outlook,
+    setpoint_c: float,
+    calmness: float,
+    period_s: float,
+    bounds: tuple[float, float],
+) -> float:
+    """Return the power that lets the water come to rest at the set point within Tc."""
+    Tc_s = max(FASTEST_S, FASTEST_PERIODS * period_s, calmness * outlook.lag_s)
+    error_k = setpoint_c - outlook.coasting_c
+    return clamp(outlook.holding_power + error_k / (outlook.gain * Tc_s), *bounds)

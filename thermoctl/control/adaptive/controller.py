@@ -1,0 +1,147 @@
+"""The bank as a controller: what the regulator shows it, and the power it asks for.
+
+Implements section 9 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+from thermoctl.control.adaptive.bank import Bank, BankBelief
+from thermoctl.control.adaptive.coasting import power_for
+from thermoctl.control.adaptive.plant_belief import (
+    PlantBelief,
+    gain,
+    holding_power_sd,
+    plant_belief,
+)
+from thermoctl.control.minimum_variance import HOLDING_SD_MAX, RIDE_MAX_S
+from thermoctl.ports import Situation
+from thermoctl.quantities import is_finite_number
+from thermoctl.signals import Beliefs
+
+CALMNESS_MIN, CALMNESS_MAX = 0.1, 10.0
+RIDE_LAGS = 3.0
+UNKNOWN_S, UNKNOWN_PERIODS = 60.0, 10.0
+"""After a longer gap nobody knows what was applied: commands expire."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AdaptiveBelief:
+    """What the controller remembers.
+
+    Parameters
+    ----------
+    bank : BankBelief
+        After the last sample the bank has seen.
+    behind_s : float
+        Time by which the bank is behind, within half a period; ahead where negative.
+    since_s, given_s : float
+        Time since its last sample, and the applied power integrated over it.
+    """
+
+    bank: BankBelief
+    behind_s: float = 0.0
+    since_s: float = 0.0
+    given_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Adaptive:
+    r"""A bank of corrected Kalman filters and the coasting temperature; nothing to tune.
+
+    32 hypotheses about lag and its shape each learn water temperature, loss and gain; they are
+    weighted by how well they predicted. The power cancels the error of the temperature at which
+    the water would come to rest, within :math:`T_c = \max(3\,\mathrm{s}, 3h, \kappa L)`.
+
+    Parameters
+    ----------
+    calmness : float
+        kappa, from .1 to 10: .3 is brisk, 1.2 calm. The one thing to choose.
+    period_s : float
+        Time between two samples, as the loop has it. Longer and shorter intervals are met by as
+        many predictions as periods went by.
+    action : {'heat', 'cool'}
+        What power does to the plant.
+
+    Raises
+    ------
+    ValueError
+        An argument is outside its range.
+    """
+
+    calmness: float = 0.6
+    period_s: float = 1.0
+    action: Literal["heat", "cool"] = "heat"
+    bank: Bank = field(init=False, repr=False, compare=False)
+
+    name: ClassVar[str] = "adaptive"
+
+    def __post_init__(self) -> None:
+        if not (is_finite_number(self.calmness) and CALMNESS_MIN <= self.calmness <= CALMNESS_MAX):
+            raise ValueError(
+                f"calmness must lie in [{CALMNESS_MIN:g}, {CALMNESS_MAX:g}], got {self.calmness!r}"
+            )
+        if self.action not in ("heat", "cool"):
+            raise ValueError(f"action must be 'heat' or 'cool', got {self.action!r}")
+        object.__setattr__(self, "bank", Bank(self.period_s))
+
+    @property
+    def _sign(self) -> float:
+        """+1 or -1: to a cooler everything looks upside down, but for its power."""
+        return 1.0 if self.action == "heat" else -1.0
+
+    def start(self) -> AdaptiveBelief:
+        """Return the belief before the first sample: nothing is known."""
+        return AdaptiveBelief(self.bank.start())
+
+    def observe(self, belief: AdaptiveBelief, situation: Situation) -> AdaptiveBelief:
+        """Return the belief after this sample, whoever steers."""
+        h, interval_s = self.period_s, situation.interval_s
+        behind_s, since_s = belief.behind_s + interval_s, belief.since_s + interval_s
+        given_s = belief.given_s + situation.applied * interval_s
+        bank, power = belief.bank, given_s / since_s if since_s > 0.0 else situation.applied
+        reading_c = self._sign * situation.measured_c
+        if interval_s > max(UNKNOWN_S, UNKNOWN_PERIODS * h):
+            return AdaptiveBelief(self.bank.observe(self.bank.lost(bank), reading_c, 0.0))
+        periods = math.floor(behind_s / h + 0.5)
+        if periods < 1:
+            return AdaptiveBelief(bank, behind_s, since_s, given_s)
+        for _ in range(periods - 1):
+            bank = self.bank.observe(bank, math.nan, power)
+        return AdaptiveBelief(self.bank.observe(bank, reading_c, power), behind_s - periods * h)
+
+    def decide(self, belief: AdaptiveBelief, situation: Situation) -> tuple[AdaptiveBelief, float]:
+        """Return the power that lets the water come to rest at the set point."""
+        outlook, setpoint_c = belief.bank.outlook, situation.setpoint_c
+        if outlook is None or not math.isfinite(setpoint_c):
+            return belief, math.nan
+        bounds = self.bank.bounds
+        r_c = self._sign * setpoint_c
+        return belief, power_for(outlook, r_c, self.calmness, self.period_s, bounds)
+
+    def beliefs(self, belief: AdaptiveBelief, situation: Situation) -> Beliefs:
+        """Return gain with its error, and holding power once it is known to .05."""
+        bank, outlook = belief.bank, belief.bank.outlook
+        if outlook is None:
+            return Beliefs()
+        rate, rate_sd = gain(self.bank, bank)
+        known = holding_power_sd(bank) <= HOLDING_SD_MAX
+        holding_power = outlook.holding_power if known else None
+        return Beliefs(self._sign * rate, rate_sd, holding_power=holding_power)
+
+    def plant(self, belief: AdaptiveBelief) -> PlantBelief | None:
+        """Return everything believed of the plant; None before the first valid reading."""
+        return plant_belief(self.bank, belief.bank, self._sign)
+
+    def ride_s(self, belief: AdaptiveBelief) -> float:
+        """Return three lags, at most 60 s; 0 before the first valid reading."""
+        outlook = belief.bank.outlook
+        return 0.0 if outlook is None else min(RIDE_LAGS * outlook.lag_s, RIDE_MAX_S)
+
+    def remarks(self, belief: AdaptiveBelief) -> Mapping[str, str]:
+        """Return nothing yet."""
+        return {}

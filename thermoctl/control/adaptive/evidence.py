@@ -1,0 +1,164 @@
+"""What a sample says: how noisy, how exciting, an outlier or a jump.
+
+Implements section 9 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from thermoctl.control.adaptive.hypotheses import Hypotheses
+from thermoctl.quantities import Array, clamp
+
+# -- noise ----------------------------------------------------------------------------------------
+
+NOISE_START_K2 = 0.001
+NOISE_MIN_K2 = 1e-5
+"""A noise below 3 mK is not believed: the model is not that good."""
+_SPREAD = 6.0  # variance of y - 2 y1 + y2 in units of the noise's: 1 + 4 + 1
+_MOST = 9.0  # a second difference counts as three standard deviations at most
+_MEMORY = 0.005  # of 200 samples
+
+
+class Noise(NamedTuple):
+    """Variance of the readings, from their second differences: warming is not noise.
+
+    Parameters
+    ----------
+    variance : float
+        The estimate in K^2; `believed` is what filters take.
+    last_c, before_last_c : float
+        The valid readings before.
+    samples : int
+        How many readings were valid.
+    """
+
+    variance: float = NOISE_START_K2
+    last_c: float = math.nan
+    before_last_c: float = math.nan
+    samples: int = 0
+
+    def after(self, y_c: float) -> Noise:
+        """Return the noise after the valid reading `y_c`."""
+        variance, n = self.variance, self.samples
+        if n >= 2:
+            second = (y_c - 2.0 * self.last_c + self.before_last_c) ** 2 / _SPREAD
+            most = _MOST * max(variance, NOISE_START_K2)
+            variance += (min(second, most) - variance) * max(_MEMORY, 1.0 / (n + 5.0))
+        return Noise(variance, y_c, self.last_c, n + 1)
+
+    @property
+    def believed(self) -> float:
+        """The variance that filters are told, R of their equations."""
+        return max(self.variance, NOISE_MIN_K2)
+
+
+# -- excitation -----------------------------------------------------------------------------------
+
+DEAD_ZONE = 0.05
+"""Power this close to its mean proves nothing. In quiet regulation ln S alone would speak, always
+for a small gain, and a small vessel drift to a wrong hypothesis."""
+_MEAN_PER_S = 0.02
+
+
+class Excitation(NamedTuple):
+    """How much the power moves; `share` in [0, 1] is what a sample counts as evidence."""
+
+    mean_power: float = 0.0
+    share: float = 0.0
+
+    def after(self, power: float, period_s: float) -> Excitation:
+        """Return the excitation after a period of `power`."""
+        away = power - self.mean_power
+        share = clamp((abs(away) - DEAD_ZONE) / DEAD_ZONE, 0.0, 1.0)
+        return Excitation(self.mean_power + min(_MEAN_PER_S * period_s, 1.0) * away, share)
+
+
+# -- outliers and jumps ---------------------------------------------------------------------------
+
+GATE = 25.0
+"""Normalised innovations squared beyond this are outside: five standard deviations."""
+GATE_SAMPLES = 20
+"""So many valid samples come before the gate closes: they show what is likely."""
+OUTLIERS = 2
+"""So many samples outside in a row are nobody's; one more, and the water has jumped."""
+HOLD_LAGS = 5.0
+"""No evidence for so many lags after a jump, or it would be read as a change of lag."""
+
+
+class Gate(NamedTuple):
+    """Samples outside in a row, and the sample before which there is no evidence."""
+
+    outside: int = 0
+    silent_until: float = -math.inf
+
+    @property
+    def outlier(self) -> bool:
+        """Whether the last sample was to be used by no filter."""
+        return 0 < self.outside <= OUTLIERS
+
+    @property
+    def jumped(self) -> bool:
+        """Whether the last sample showed the water somewhere else."""
+        return self.outside > OUTLIERS
+
+    def within(self) -> Gate:
+        """Return the gate after a sample inside."""
+        return self if self.outside == 0 else Gate(0, self.silent_until)
+
+    def beyond(self, sample: int, hold: float) -> Gate:
+        """Return the gate after a sample outside; a jump is silent for `hold` samples."""
+        outside = self.outside + 1
+        return Gate(outside, sample + hold if outside > OUTLIERS else self.silent_until)
+
+
+# -- weights --------------------------------------------------------------------------------------
+
+SURPRISE_MAX = 9.0
+"""One sample costs a hypothesis no more than three standard deviations."""
+FLOOR = -30.0
+"""No log weight falls lower, so that a hypothesis can return within tens of seconds."""
+EVIDENCE_FROM = 4
+"""Samples at the start that are no evidence: the filters have not met the sensor yet."""
+
+
+class Weights(NamedTuple):
+    """How likely each hypothesis is.
+
+    Parameters
+    ----------
+    log : ndarray, shape (n,)
+        Log of the weight, 0 for the likeliest, at least `FLOOR`.
+    share : ndarray, shape (n,)
+        The same as probabilities: they add up to 1.
+    likeliest : int
+        The hypothesis with log 0, the first of equals.
+    """
+
+    log: Array
+    share: Array
+    likeliest: int
+
+    def after(self, e: float, nu: Array, S: Array) -> Weights:
+        """Return the weights after innovations `nu` of variances `S`, counted as `e`."""
+        cost = nu * nu
+        cost /= S
+        np.minimum(cost, SURPRISE_MAX, out=cost)
+        cost += np.log(S)
+        cost *= -0.5 * e
+        cost += self.log  # ALF (6)-(7), in logarithms
+        likeliest = int(cost.argmax())
+        cost -= cost[likeliest]
+        np.maximum(cost, FLOOR, out=cost)
+        share = np.exp(cost)
+        share /= share.sum()
+        return Weights(cost, share, likeliest)
+
+
+def equal(hypotheses: Hypotheses) -> Weights:
+    """Return the weights before any evidence."""
+    n = len(hypotheses)
+    return Weights(np.zeros(n), np.full(n, 1.0 / n), 0)

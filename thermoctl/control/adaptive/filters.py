@@ -1,0 +1,141 @@
+r"""A Kalman filter for every hypothesis, all in one array.
+
+The state is :math:`x = (T, z, d, \beta)`: water and sensor in degC, loss and gain in K per period,
+without power and from full power. A block holds ``[P | x]``, shape (4, 5, n), so that what is done
+to the rows of P is done to x in the same breath. Every function but `project` returns a new one.
+
+P is symmetric to the last bit, since each pair of elements is made by the same operations on equal
+numbers; no second pass is needed (``test_covariances_stay_symmetric_to_the_last_bit``).
+
+Implements section 9 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from thermoctl.control.adaptive.hypotheses import Hypotheses
+from thermoctl.quantities import Array
+
+Block = Array
+T, Z, D, BETA = range(4)
+X = 4
+"""Column of the state in a block; columns 0 to 3 are P."""
+
+START_GAIN = 0.002
+"""First guess of the gain in K/s; with `START_SD` it hardly matters."""
+START_SD = (1.0, 1.0, 0.001, 0.15)
+"""Of T and z in K, d and beta in K/s. Tight on the loss, wide on the gain: a warm-up at full power
+cannot tell the two apart, and a loss that was learnt there in place of a gain is held for real."""
+START_CORRELATION = 0.98
+"""Of T and z: a sensor shows the water it lies in."""
+
+DRIFT_T, DRIFT_D, DRIFT_BETA = 0.06, 0.0015, 2e-4
+"""Noise of T, d and beta in a second, as shares of the gain."""
+DRIFT_Z_K = 0.003
+"""Noise of z in a second."""
+DRIFT_GAIN_MIN = 1e-4
+"""The shares are of no smaller gain than this, in K/s."""
+
+GAIN_MIN, GAIN_MAX = 2e-5, 0.5
+"""What a heater can do to water, in K/s: 20 W in 200 l, 1,500 W in .7 l."""
+LOSS_MIN, LOSS_MAX = 0.5, 0.95
+"""The loss keeps this far below the least and within this share of full power, in gains."""
+
+
+class Drift:
+    """Process noise at one period: ``diag((.06 b)^2, .003^2, (.0015 b)^2, (2e-4 b)^2)``."""
+
+    __slots__ = ("gain_min", "per_gain", "z")
+
+    def __init__(self, period_s: float) -> None:
+        # Per second the noises are variances and grow with the period; the gain of a period is h
+        # times that of a second, and so is the unit of d and beta.
+        in_units = np.array([DRIFT_T / period_s, 0.0, DRIFT_D, DRIFT_BETA])
+        self.per_gain = (in_units**2 * period_s)[:, None]
+        self.z = DRIFT_Z_K**2 * period_s
+        self.gain_min = DRIFT_GAIN_MIN * period_s
+
+
+def start(hypotheses: Hypotheses, y_c: float) -> Block:
+    """Return the block of a plant at rest at its first reading."""
+    h, block = hypotheses.period_s, np.zeros((4, 5, len(hypotheses)))
+    sd = np.array(START_SD) * (1.0, 1.0, h, h)
+    P = np.diag(sd**2)
+    P[T, Z] = P[Z, T] = START_CORRELATION * sd[T] * sd[Z]
+    block[:, :X] = P[:, :, None]
+    block[:, X] = np.array([y_c, y_c, 0.0, START_GAIN * h])[:, None]
+    return block
+
+
+def restarted(block: Block, hypotheses: Hypotheses, y_c: float) -> Block:
+    """Return `block` with water and sensor as at the start; gain and loss stay as they are."""
+    after = start(hypotheses, y_c)
+    after[D:, D:] = block[D:, D:]
+    return after
+
+
+def predicted(block: Block, heat: Array, sensor_step: Array, drift: Drift) -> Block:
+    """Return the block one period later: T' = T - d + beta q, z' = z + a (T - z)."""
+    water, sensor, loss, gain = block
+    after = np.empty_like(block)
+    np.multiply(gain, heat, out=after[T])
+    after[T] -= loss
+    after[T] += water
+    np.subtract(water, sensor, out=after[Z])
+    after[Z] *= sensor_step
+    after[Z] += sensor
+    after[D:] = block[D:]
+    _times_transposed(after, heat, sensor_step)
+    b = np.maximum(gain[X], drift.gain_min)
+    b *= b
+    diagonal = after.reshape(20, -1)[:19:6]  # elements (0, 0), (1, 1), (2, 2), (3, 3)
+    diagonal += drift.per_gain * b
+    diagonal[Z] += drift.z
+    return after
+
+
+def _times_transposed(after: Block, heat: Array, sensor_step: Array) -> None:
+    """Multiply the P of a new block by F' from the right, in place."""
+    water, sensor = after[:, T], after[:, Z]
+    towards = water - sensor
+    towards *= sensor_step
+    sensor += towards
+    warmed = after[:, BETA] * heat
+    warmed -= after[:, D]
+    water += warmed
+    after[Z, T] = after[T, Z]  # the one pair whose two ways of rounding differ
+
+
+def inflated(block: Block, nu: float, R: float) -> Block:
+    r"""Return the block after the water has jumped; O21 (25)-(26) on T and z alone.
+
+    :math:`\lambda^* = \max(1, \nu^2/S)` with the innovation `nu` of the likeliest hypothesis.
+    On all states, loss and gain would run away.
+    """
+    after = block.copy()
+    root = np.sqrt(np.maximum(nu * nu / (block[Z, Z] + R), 1.0))  # O21 (26)
+    after[: Z + 1, :X] *= root
+    after[:, : Z + 1] *= root
+    return after
+
+
+def corrected(block: Block, y_c: float, R: float) -> tuple[Block, Array, Array]:
+    """Return the block after reading `y_c`, with innovation and its variance, shape (n,)."""
+    S = block[Z, Z] + R
+    nu = y_c - block[Z, X]
+    g = block[Z] / np.sqrt(S)  # P H' / sqrt S, and beside it:
+    np.divide(nu, -np.sqrt(S), out=g[X])
+    return block - g[:X, None] * g, nu, S  # P - g g', x + g nu / sqrt S
+
+
+def project(block: Block, hypotheses: Hypotheses, u_min: float, *, loss: bool) -> None:
+    """Limit gain, and if asked for loss, of a new block to what a plant can have; in place."""
+    h = hypotheses.period_s
+    beta = block[BETA, X]
+    np.maximum(beta, GAIN_MIN * h, out=beta)
+    np.minimum(beta, GAIN_MAX * h, out=beta)
+    if loss:
+        d = block[D, X]
+        np.maximum(d, (u_min - LOSS_MIN) * beta, out=d)
+        np.minimum(d, LOSS_MAX * beta, out=d)

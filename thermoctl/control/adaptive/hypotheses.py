@@ -1,0 +1,85 @@
+"""What the plant might be: total lags times two ways of dividing them.
+
+Implements section 9 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from thermoctl.quantities import Array, is_finite_number
+
+SHORTEST_LAG_S = 3.0
+LONGEST_OVER_SHORTEST = 50.0
+LAGS = 16
+"""3 to 150 s in ratios of 1.30. Beyond 1.43 a plant that lies between two of them is held badly."""
+
+SHAPES = ((0.18, 0.31, 0.51), (0.10, 0.75, 0.15))
+"""Shares of dead time, heater and sensor: a slow sensor, and a slow heater."""
+
+PERIOD_MIN_S, PERIOD_MAX_S = 0.05, 3600.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hypotheses:
+    """Constants of every hypothesis at one period; arrays of shape (n,), read-only.
+
+    Parameters
+    ----------
+    period_s : float
+        Time from one sample to the next.
+    lag_s : ndarray
+        Total lag L: dead time, heater and sensor together.
+    dead : ndarray of int
+        Dead time in whole periods.
+    element : ndarray
+        Time constant of the heater in periods.
+    element_step, sensor_step : ndarray
+        What heater and sensor make up of a step within a period, in (0, 1].
+    """
+
+    period_s: float
+    lag_s: Array
+    dead: npt.NDArray[np.intp]
+    element: Array
+    element_step: Array
+    sensor_step: Array
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    @classmethod
+    def at_period(cls, period_s: float) -> Self:
+        """Return all of `LAGS` times `SHAPES`, lag by lag.
+
+        Raises
+        ------
+        ValueError
+            `period_s` lies outside .05 to 3,600 s.
+        """
+        if not (is_finite_number(period_s) and PERIOD_MIN_S <= period_s <= PERIOD_MAX_S):
+            raise ValueError(
+                f"period_s must lie in [{PERIOD_MIN_S:g}, {PERIOD_MAX_S:g}], got {period_s!r}"
+            )
+        lags_s = SHORTEST_LAG_S * LONGEST_OVER_SHORTEST ** (np.arange(LAGS) / (LAGS - 1.0))
+        lag_s = np.repeat(lags_s, len(SHAPES))
+        dead_s, element_s, sensor_s = np.tile(np.array(SHAPES), (LAGS, 1)).T * lag_s
+        return cls(
+            period_s=float(period_s),
+            lag_s=lag_s,
+            dead=np.rint(dead_s / period_s).astype(np.intp),
+            element=element_s / period_s,
+            element_step=-np.expm1(-period_s / element_s),
+            sensor_step=-np.expm1(-period_s / sensor_s),
+        )
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self.lag_s)

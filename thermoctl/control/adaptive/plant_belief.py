@@ -1,0 +1,123 @@
+"""What the bank believes of its plant, in words for people.
+
+Implements section 9 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from thermoctl.control.adaptive.bank import Bank, BankBelief
+from thermoctl.control.adaptive.filters import BETA, D, X
+from thermoctl.quantities import Array
+
+LAG_QUANTILES = (0.05, 0.95)
+
+
+@dataclass(frozen=True, slots=True)
+class PlantBelief:
+    """A plant as the bank sees it after a sample.
+
+    Parameters
+    ----------
+    gain_k_per_s, gain_sd_k_per_s : float
+        Heating rate at full power and its standard deviation; negative where power cools.
+    loss_k_per_s, loss_sd_k_per_s : float
+        How fast the water would cool without power.
+    holding_power, holding_power_sd : float
+        Power that makes up for the loss, as a fraction.
+    lag_s, lag_low_s, lag_high_s : float
+        Total lag from heater to reading: mean, 5 % and 95 % quantile.
+    coasting_c : float
+        Where the water would come to rest with holding power from now on, in degC.
+    noise_sd_k : float
+        Standard deviation of a reading.
+    learning : bool
+        Whether the last sample counted as evidence for or against a lag.
+    jumped : bool
+        Whether the last sample showed the water somewhere else than it could be.
+    """
+
+    gain_k_per_s: float
+    gain_sd_k_per_s: float
+    loss_k_per_s: float
+    loss_sd_k_per_s: float
+    holding_power: float
+    holding_power_sd: float
+    lag_s: float
+    lag_low_s: float
+    lag_high_s: float
+    coasting_c: float
+    noise_sd_k: float
+    learning: bool
+    jumped: bool
+
+
+def plant_belief(bank: Bank, belief: BankBelief, sign: float = 1.0) -> PlantBelief | None:
+    """Return what is believed of the plant; None before the first valid reading.
+
+    Parameters
+    ----------
+    bank, belief : Bank, BankBelief
+        The law and what it believes.
+    sign : float
+        -1 where temperatures were negated because power cools.
+    """
+    if belief.block is None or belief.outlook is None:
+        return None
+    h, outlook = bank.period_s, belief.outlook
+    _, gain_sd = gain(bank, belief)
+    loss = belief.block[D, X]
+    loss_mean, loss_sd = mixed(loss, belief.block[D, D], belief.weights.share)
+    low_s, high_s = lag_quantiles(bank, belief)
+    return PlantBelief(
+        gain_k_per_s=sign * outlook.gain,
+        gain_sd_k_per_s=gain_sd,
+        loss_k_per_s=sign * loss_mean / h,
+        loss_sd_k_per_s=loss_sd / h,
+        holding_power=outlook.holding_power,
+        holding_power_sd=holding_power_sd(belief),
+        lag_s=outlook.lag_s,
+        lag_low_s=low_s,
+        lag_high_s=high_s,
+        coasting_c=sign * outlook.coasting_c,
+        noise_sd_k=math.sqrt(belief.noise.variance),
+        learning=belief.learning,
+        jumped=belief.gate.jumped,
+    )
+
+
+def mixed(means: Array, variances: Array, share: Array) -> tuple[float, float]:
+    """Return mean and standard deviation of a mixture with the weights `share`."""
+    mean = float(share.dot(means))
+    away = means - mean
+    return mean, math.sqrt(max(float(share.dot(variances + away * away)), 0.0))
+
+
+def gain(bank: Bank, belief: BankBelief) -> tuple[float, float]:
+    """Return the gain in K/s with its standard deviation, after the first reading."""
+    assert belief.block is not None
+    mean, sd = mixed(belief.block[BETA, X], belief.block[BETA, BETA], belief.weights.share)
+    return mean / bank.period_s, sd / bank.period_s
+
+
+def holding_power_sd(belief: BankBelief) -> float:
+    """Return the standard deviation of the holding power d/beta, by linearisation."""
+    assert belief.block is not None
+    block = belief.block
+    beta = block[BETA, X]
+    power = block[D, X] / beta
+    slope = block[D, D] - 2.0 * power * block[D, BETA] + power * power * block[BETA, BETA]
+    return mixed(power, slope / (beta * beta), belief.weights.share)[1]
+
+
+def lag_quantiles(bank: Bank, belief: BankBelief) -> tuple[float, float]:
+    """Return the lags below which the hypotheses have 5 % and 95 % of the weight."""
+    order = np.argsort(bank.hypotheses.lag_s, kind="stable")
+    weight = np.cumsum(belief.weights.share[order])
+    low, high = np.searchsorted(weight, np.array(LAG_QUANTILES) * weight[-1])
+    lags = bank.hypotheses.lag_s[order]
+    return float(lags[low]), float(lags[high])
