@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from thermoctl.estimation.batch import advance, usable
-from thermoctl.estimation.belief import LARGEST, floats, frozen, positive
+from thermoctl.estimation.belief import LARGEST, frozen, positive, scalar, shown
 from thermoctl.estimation.identifier import pushed
 from thermoctl.estimation.kalman import RandomWalkKalman
 from thermoctl.estimation.recursion import drift, identity
@@ -114,7 +114,7 @@ class LainiotisBank:
         positive("R", self.R)
         positive("P0", self.P0)
         if not (is_finite_number(self.Q) and 0.0 <= self.Q < LARGEST):
-            raise ValueError(f"Q must not be negative, got {self.Q!r}")
+            raise ValueError(f"Q must be a float of at least 0, got {shown(self.Q)}")
         if not (is_finite_number(self.floor) and 0.0 <= self.floor <= 1.0 / len(orders)):
             raise ValueError(f"floor must lie in [0, 1/{len(orders)}], got {self.floor!r}")
         layout = _Layout(orders)
@@ -181,7 +181,7 @@ class LainiotisBank:
         ValueError
             `y` or `u` is no number.
         """
-        y, u = _scalar("y", y), _scalar("u", u)
+        y, u = scalar("y", y), scalar("u", u)
         before, layout = self._belief, self._layout
         if not (abs(y) < PAST_LIMIT and abs(u) < PAST_LIMIT):  # false for NaN
             return self._with(before.marked())
@@ -225,7 +225,7 @@ class LainiotisBank:
         ValueError
             `y` or `u` is no number.
         """
-        y, u = _scalar("y", y), _scalar("u", u)
+        y, u = scalar("y", y), scalar("u", u)
         before = self._belief
         if not (abs(y) < PAST_LIMIT and abs(u) < PAST_LIMIT):  # false for NaN
             return self._with(before.marked())
@@ -300,7 +300,10 @@ class _Layout:
 
 def _checked(candidates: Sequence[Order]) -> tuple[Order, ...]:
     """Return the candidates as a tuple, or raise ``ValueError``."""
-    orders = tuple(candidates)
+    try:
+        orders = tuple(candidates)
+    except TypeError as error:
+        raise ValueError(f"candidates must be a sequence of Order, got {candidates!r}") from error
     if not orders:
         raise ValueError("candidates must not be empty")
     seen = set()
@@ -312,14 +315,6 @@ def _checked(candidates: Sequence[Order]) -> tuple[Order, ...]:
             raise ValueError(f"candidates must differ, {order} repeats another")
         seen.add(structure)
     return orders
-
-
-def _scalar(name: str, value: float) -> float:
-    """Return `value` as a float; raise ``ValueError`` when it is no single number."""
-    number = floats(name, value)
-    if number.ndim:
-        raise ValueError(f"{name} must be a single number, got shape {number.shape}")
-    return float(number)
 
 
 def _floored(log_weights: Array, floor: float) -> Array:

@@ -79,7 +79,7 @@ def run_batch(
     if y.ndim != 2:
         raise ValueError(f"y must have shape (T, R), got {y.shape}")
     if phi.ndim != 3 or phi.shape[:2] != y.shape or phi.shape[2] < 1:
-        raise ValueError(f"phi must have shape {(*y.shape, 'n')}, got {phi.shape}")
+        raise ValueError(f"phi must have shape ({y.shape[0]}, {y.shape[1]}, n), got {phi.shape}")
     belief = start(phi.shape[2], P0, theta0)
     columns = np.ascontiguousarray(np.moveaxis(phi, 1, 2))
     with np.errstate(all="ignore"):  # what overflows here is found in the result

@@ -17,6 +17,9 @@ LARGEST = 1e50
 It is beyond every meaning, and within it no product in this room can overflow.
 """
 
+SHOWN = 200
+"""Characters of a refused value that a message repeats."""
+
 
 def start(n: int, P0: float | npt.ArrayLike = 1.0, theta0: npt.ArrayLike | None = None) -> Estimate:
     """Return the belief before the first sample.
@@ -34,7 +37,7 @@ def start(n: int, P0: float | npt.ArrayLike = 1.0, theta0: npt.ArrayLike | None 
     ------
     ValueError
         `n` is no positive integer; `P0` is not finite, symmetric and positive semi-definite of
-        that size; `theta0` is not finite or not of that shape.
+        that size; `theta0` does not lie below `LARGEST` or is not of that shape.
     """
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
         raise ValueError(f"n must be a positive integer, got {n!r}")
@@ -63,9 +66,7 @@ def covariance(name: str, value: float | npt.ArrayLike, n: int | None = None) ->
     size = matrix.shape[0] if n is None and matrix.ndim else n
     if matrix.shape != (size, size):
         raise ValueError(f"{name} must be a float or of shape ({size}, {size}), got {matrix.shape}")
-    scale = float(np.abs(matrix).max())
-    if not scale < LARGEST:
-        raise ValueError(f"{name} must lie below {LARGEST:g}, got {scale:g}")
+    scale = _largest(name, matrix)
     if np.abs(matrix - matrix.T).max() > 1e-9 * scale:
         raise ValueError(f"{name} must be symmetric, got {matrix.tolist()}")
     matrix = 0.5 * (matrix + matrix.T)
@@ -79,17 +80,47 @@ def covariance(name: str, value: float | npt.ArrayLike, n: int | None = None) ->
 
 def positive(name: str, value: float, at_most: float = LARGEST) -> None:
     """Raise ``ValueError`` unless `value` is a number in [1/LARGEST, at_most]."""
-    if not is_finite_number(value) or not 1.0 / LARGEST <= value <= at_most:
-        limit = "" if at_most == LARGEST else f" and at most {at_most:g}"
-        raise ValueError(f"{name} must be positive{limit}, got {value!r}")
+    if is_finite_number(value) and 1.0 / LARGEST <= value <= at_most:
+        return
+    limit = "" if at_most == LARGEST else f" and at most {at_most:g}"
+    if is_finite_number(value) and value > 0.0:
+        limit = f", from {1.0 / LARGEST:g} to {at_most:g}"
+    raise ValueError(f"{name} must be positive{limit}, got {shown(value)}")
+
+
+def truth(name: str, value: object) -> None:
+    """Raise ``ValueError`` unless `value` is True or False."""
+    if not isinstance(value, bool):
+        raise ValueError(f"{name} must be True or False, got {shown(value)}")  # noqa: TRY004
 
 
 def numbers(name: str, value: npt.ArrayLike) -> Array:
     """Return `value` as a new array of finite floats; ``ValueError`` if not."""
     array = floats(name, value).copy()
     if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {value!r}")
+        raise ValueError(f"{name} must be finite, got {shown(value)}")
     return array
+
+
+def bounded(name: str, value: npt.ArrayLike) -> Array:
+    """Return `value` as a new array of floats below `LARGEST`; ``ValueError`` if not."""
+    array = numbers(name, value)
+    if array.size:
+        _largest(name, array)
+    return array
+
+
+def scalar(name: str, value: float | npt.ArrayLike) -> float:
+    """Return `value` as a plain float, NaN included; ``ValueError`` when it is no number."""
+    if isinstance(value, float):
+        return float(value)  # also of numpy's own, which would warn where a plain one overflows
+    try:
+        number = floats(name, value)
+    except ValueError as error:
+        raise ValueError(f"{name} must be a number, got {shown(value)}") from error
+    if number.ndim:
+        raise ValueError(f"{name} must be a single number, got {shown(value)}")
+    return float(number)
 
 
 def floats(name: str, value: npt.ArrayLike) -> Array:
@@ -104,12 +135,27 @@ def floats(name: str, value: npt.ArrayLike) -> Array:
         if given.dtype.kind not in "bcSU":
             return np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name} must consist of numbers, got {value!r}") from error
-    raise ValueError(f"{name} must consist of numbers, got {value!r}")
+        raise ValueError(f"{name} must consist of numbers, got {shown(value)}") from error
+    raise ValueError(f"{name} must consist of numbers, got {shown(value)}")
+
+
+def shown(value: object) -> str:
+    """Return `value` as one short line for a message."""
+    text = repr(value.tolist() if isinstance(value, np.ndarray) else value)
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+
+
+def _largest(name: str, array: Array) -> float:
+    """Return the largest magnitude in `array`, or raise ``ValueError`` if it is past all use."""
+    largest = float(np.abs(array).max())
+    if not largest < LARGEST:
+        raise ValueError(f"{name} must lie below {LARGEST:g}, got {largest:g}")
+    return largest
 
 
 def _parameters(name: str, value: npt.ArrayLike | None, n: int) -> Array:
-    theta = np.zeros(n) if value is None else numbers(name, value)
+    """Return the first guess, read-only; zeros where none is given."""
+    theta = np.zeros(n) if value is None else bounded(name, value)
     if theta.shape != (n,):
         raise ValueError(f"{name} must have shape ({n},), got {theta.shape}")
     return frozen(theta)

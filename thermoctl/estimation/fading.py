@@ -15,7 +15,7 @@ from statistics import NormalDist
 import numpy as np
 import numpy.typing as npt
 
-from thermoctl.estimation.belief import positive
+from thermoctl.estimation.belief import positive, truth
 from thermoctl.estimation.state_space import LinearModel, Prediction, StateLaw, faded
 from thermoctl.quantities import Array, is_finite_number
 
@@ -38,6 +38,8 @@ class MultipleFading(StateLaw):
 
     Raises
     ------
+    TypeError
+        `model` is no `LinearModel`.
     ValueError
         A row of H has not exactly one non-zero; `confidence` is not in (0, 1).
     """
@@ -49,6 +51,7 @@ class MultipleFading(StateLaw):
     """Which state each row of H observes, shape (m,)."""
 
     def __post_init__(self) -> None:
+        StateLaw.__post_init__(self)  # super() does not see through slots
         if not is_finite_number(self.confidence) or not 0.0 < self.confidence < 1.0:
             raise ValueError(f"confidence must lie between 0 and 1, got {self.confidence!r}")
         # By the lower tail, which is still exact where 1 - confidence is next to nothing.
@@ -107,6 +110,8 @@ class MatrixFading(MultipleFading):
 
     Raises
     ------
+    TypeError
+        `model` is no `LinearModel`.
     ValueError
         A row of H has not exactly one non-zero, or a number is out of its range.
     """
@@ -120,12 +125,11 @@ class MatrixFading(MultipleFading):
     gate: float | None = None
 
     def __post_init__(self) -> None:
-        MultipleFading.__post_init__(self)  # super() does not see through slots
+        MultipleFading.__post_init__(self)
         if not is_finite_number(self.tau) or not 0.0 < self.tau < 1.0:
             raise ValueError(f"tau must lie between 0 and 1, got {self.tau!r}")
         positive("delta", self.delta)
-        if self.normalised not in (True, False):
-            raise ValueError(f"normalised must be true or false, got {self.normalised!r}")
+        truth("normalised", self.normalised)
         steps = self.max_iterations
         if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
             raise ValueError(f"max_iterations must be a positive integer, got {steps!r}")

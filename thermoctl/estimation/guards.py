@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from thermoctl.estimation.belief import frozen, positive, start
+from thermoctl.estimation.belief import frozen, positive, start, truth
 from thermoctl.estimation.kalman import CorrectedKalman, RandomWalkKalman
 from thermoctl.estimation.least_squares import RecursiveLeastSquares
 from thermoctl.estimation.recursion import RecursiveLaw
@@ -89,7 +89,7 @@ class Guarded:
     TypeError
         `law` is none of the bare laws.
     ValueError
-        A limit is not positive, or `robust_R2` is asked of a law without R2.
+        A limit is not positive, `robust_R2` no bool, or asked of a law without R2.
     """
 
     law: RecursiveLaw
@@ -107,6 +107,7 @@ class Guarded:
             positive("excitation_min", self.excitation_min)
         if self.R2_min is not None:
             positive("R2_min", self.R2_min)
+        truth("robust_R2", self.robust_R2)
         if self.robust_R2 and not isinstance(self.law, RandomWalkKalman | CorrectedKalman):
             raise ValueError(f"robust_R2 needs a law with R2, got {type(self.law).__name__}")
 
@@ -118,8 +119,8 @@ class Guarded:
 
         Raises
         ------
-        ValueError
-            `phi` does not have the shape of ``belief.theta``.
+        TypeError, ValueError
+            As the bare law.
         """
         before = belief if isinstance(belief, GuardedEstimate) else _adopted(belief)
         law = self._law(before._memory)
@@ -179,6 +180,8 @@ class Guarded:
 
 def _adopted(belief: Estimate) -> GuardedEstimate:
     """Return a bare belief as one whose guards remember nothing yet."""
+    if not isinstance(belief, Estimate):
+        raise TypeError(f"belief must be an Estimate, got {type(belief).__name__}")
     return GuardedEstimate(
         belief.theta,
         belief.P,

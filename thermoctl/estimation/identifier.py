@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from thermoctl.estimation.belief import frozen, start
+from thermoctl.estimation.belief import frozen, scalar, start
 from thermoctl.model.arx import Structure
 from thermoctl.ports import Estimator
 from thermoctl.quantities import Array
@@ -94,7 +94,14 @@ class Identifier:
         -------
         IdentifierBelief
             The new belief; its estimate is ``rejected`` when the sample could not be used.
+
+        Raises
+        ------
+        ValueError
+            `temperature_c` or `applied` is no number.
         """
+        temperature_c = scalar("temperature_c", temperature_c)
+        applied = scalar("applied", applied)
         u_past = pushed(belief.u_past, applied)
         phi = self.structure.regressor(belief.y_past_c, u_past)
         target = self.structure.target(temperature_c, u_past)

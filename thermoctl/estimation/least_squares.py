@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from thermoctl.estimation.belief import positive
+from thermoctl.estimation.belief import positive, truth
 from thermoctl.estimation.recursion import Arithmetic, RecursiveLaw, V
 
 
@@ -80,8 +80,7 @@ class VariableForgetting(RecursiveLaw):
     def __post_init__(self) -> None:
         positive("Sigma0", self.Sigma0)
         positive("forgetting_min", self.forgetting_min, at_most=1.0)
-        if not isinstance(self.joint, bool):
-            raise ValueError(f"joint must be True or False, got {self.joint!r}")  # noqa: TRY004
+        truth("joint", self.joint)
 
     @property
     def R1(self) -> float:  # noqa: N802 - R1 keeps its letter

@@ -23,7 +23,15 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from thermoctl.estimation.belief import LARGEST, covariance, floats, frozen, numbers
+from thermoctl.estimation.belief import (
+    LARGEST,
+    covariance,
+    floats,
+    frozen,
+    numbers,
+    scalar,
+    shown,
+)
 from thermoctl.quantities import Array, is_finite_number
 from thermoctl.signals import Estimate
 
@@ -82,13 +90,18 @@ class RecursiveLaw(ABC):
 
         Raises
         ------
+        TypeError
+            `belief` is no `Estimate`.
         ValueError
             `phi` or `y` does not consist of numbers; `phi` does not have the shape of
             ``belief.theta``, or R1 that of ``belief.P``.
         """
         if not (isinstance(phi, np.ndarray) and phi.dtype is _FLOAT):
             phi = floats("phi", phi)
-        theta, P = belief.theta, belief.P
+        try:
+            theta, P = belief.theta, belief.P
+        except AttributeError as error:
+            raise TypeError(f"belief must be an Estimate, got {type(belief).__name__}") from error
         if phi.shape != theta.shape:
             raise ValueError(f"phi must have shape {theta.shape}, got {phi.shape}")
         # Plain floats add up without a warning; the comparison is false for NaN. Once phi, and
@@ -96,7 +109,7 @@ class RecursiveLaw(ABC):
         if not sum(map(abs, phi.tolist())) < LARGEST:
             return rejected(belief)
         P_phi = P.dot(phi)  # ndarray.dot, not @: it is twice as fast on small arrays
-        e = _number(y) - float(theta.dot(phi))
+        e = scalar("y", y) - float(theta.dot(phi))
         q = max(float(phi.dot(P_phi)), 0.0)  # rounding can leave a vanishing one below zero
         S, inflation = self.weigh(q, e, len(theta), NUMBERS)
         if not e * e < LARGEST * S < math.inf:
@@ -118,14 +131,6 @@ class RecursiveLaw(ABC):
         return Estimate(frozen(theta), frozen(P), e, S, inflation, False)
 
 
-def _number(y: float) -> float:
-    """Return the output `y` as a float; raise ValueError when it is no number."""
-    try:
-        return float(y + 0.0)  # which text cannot do, though `float` alone would take it
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"y must be a number, got {y!r}") from error
-
-
 def rejected(belief: Estimate) -> Estimate:
     """Return `belief` with nothing changed but the mark that a sample was not used."""
     return replace(belief, rejected=True)
@@ -138,7 +143,7 @@ def checked_drift(value: float | Array) -> float | Array:
     matrix = numbers("R1", value)
     if matrix.ndim == 2:
         return covariance("R1", matrix)
-    raise ValueError(f"R1 must be a non-negative float or a covariance matrix, got {value!r}")
+    raise ValueError(f"R1 must be a non-negative float or a covariance matrix, got {shown(value)}")
 
 
 def drift(R1: float | Array, n: int) -> Array:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from thermoctl.estimation.belief import LARGEST, covariance, floats, frozen, numbers
+from thermoctl.estimation.belief import LARGEST, bounded, covariance, floats, frozen
 from thermoctl.quantities import Array
 
 
@@ -46,7 +46,7 @@ class LinearModel:
     R: Array
 
     def __post_init__(self) -> None:
-        F, H = (_bounded(name, getattr(self, name)) for name in ("F", "H"))
+        F, H = (bounded(name, getattr(self, name)) for name in ("F", "H"))
         if F.ndim != 2 or F.shape[0] != F.shape[1] or F.size == 0:
             raise ValueError(f"F must be a square matrix, got shape {F.shape}")
         if H.ndim != 2 or H.shape[0] == 0 or H.shape[1] != len(F):
@@ -124,9 +124,18 @@ class StateLaw:
     ----------
     model : LinearModel
         The model taken for true.
+
+    Raises
+    ------
+    TypeError
+        `model` is no `LinearModel`.
     """
 
     model: LinearModel
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.model, LinearModel):
+            raise TypeError(f"model must be a LinearModel, got {type(self.model).__name__}")
 
     def start(self, x0: npt.ArrayLike, P0: float | npt.ArrayLike) -> StateBelief:
         """Return the belief one step before the first observation.
@@ -144,7 +153,7 @@ class StateLaw:
             `x0` is not finite or not of that shape; `P0` is no covariance of that size.
         """
         n, m = self.model.n, self.model.m
-        x = _bounded("x0", x0)
+        x = bounded("x0", x0)
         if x.shape != (n,):
             raise ValueError(f"x0 must have shape ({n},), got {x.shape}")
         return StateBelief(
@@ -174,16 +183,17 @@ class StateLaw:
 
         Raises
         ------
+        TypeError
+            `belief` is no `StateBelief`.
         ValueError
             `z` does not consist of numbers or has another shape, or `belief` is one of another
-            number of states.
+            number of states or observations.
         """
         n, m = self.model.n, self.model.m
         observation = np.atleast_1d(floats("z", z))
         if observation.shape != (m,):
             raise ValueError(f"z must have shape ({m},), got {np.shape(z)}")
-        if belief.x.shape != (n,):
-            raise ValueError(f"belief must be one of {n} states, got {len(belief.x)}")
+        _check_belief(belief, n, m)
         with np.errstate(all="ignore"):  # overflow shows in the result, which is looked at
             prediction = self._predict(belief, observation)
             for fading in self.factors(prediction):
@@ -243,6 +253,11 @@ class StateKalman(StateLaw):
     ----------
     model : LinearModel
         The model taken for true.
+
+    Raises
+    ------
+    TypeError
+        `model` is no `LinearModel`.
     """
 
 
@@ -251,12 +266,14 @@ def faded(model: LinearModel, J: Array, fading: Array) -> Array:
     return fading[:, None] * J * fading + model.Q  # BO17 (14)
 
 
-def _bounded(name: str, value: npt.ArrayLike) -> Array:
-    """Return `value` as a new array of numbers below LARGEST, or raise ValueError naming it."""
-    array = numbers(name, value)
-    if not _sane(array):
-        raise ValueError(f"{name} must lie below {LARGEST:g}, got {np.abs(array).max():g}")
-    return array
+def _check_belief(belief: StateBelief, n: int, m: int) -> None:
+    """Raise unless `belief` is one of `n` states and `m` observations."""
+    if not isinstance(belief, StateBelief):
+        raise TypeError(f"belief must be a StateBelief, got {type(belief).__name__}")
+    if belief.x.shape != (n,):
+        raise ValueError(f"belief must be one of {n} states, got {len(belief.x)}")
+    if belief.innovation.shape != (m,):
+        raise ValueError(f"belief must be one of {m} observations, got {len(belief.innovation)}")
 
 
 def _sane(*arrays: Array) -> bool:

@@ -311,7 +311,7 @@ def test_fading_needs_one_state_to_a_row_of_H(H):
         *(("s_min", value) for value in (1.1, math.nan, None)),
         *(("s_max", value) for value in (0.9, math.nan, "1")),
         *(("gate", value) for value in (0.0, math.nan, "open")),
-        ("normalised", "no"),
+        *(("normalised", value) for value in ("no", 1, None)),
     ],
 )
 def test_a_law_names_the_setting_it_refuses(name, value):

@@ -202,6 +202,9 @@ def test_a_limit_that_is_not_positive_is_named(name, arguments):
 def test_guards_refuse_what_they_cannot_guard():
     with pytest.raises(ValueError, match="robust_R2"):
         Guarded(RecursiveLeastSquares(), robust_R2=True)
+    for wrong in (1, "no", None):
+        with pytest.raises(ValueError, match=r"^robust_R2 must be True or False, got "):
+            Guarded(CorrectedKalman(), robust_R2=wrong)
     with pytest.raises(TypeError, match="Guarded"):
         Guarded(Guarded(CorrectedKalman()))
     with pytest.raises(ValueError, match="phi"):

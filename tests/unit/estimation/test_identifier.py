@@ -105,6 +105,15 @@ def test_an_update_leaves_the_belief_before_it_as_it_was():
     assert np.array_equal(before.estimate.theta, theta)
 
 
+@pytest.mark.parametrize("wrong", [None, "20", 1j, [20.0], True])
+def test_a_reading_and_a_power_that_are_no_numbers_are_named(wrong):
+    identifier = Identifier(KnownGain(0.04), CorrectedKalman())
+    with pytest.raises(ValueError, match=r"^temperature_c must be a"):
+        identifier.update(identifier.start(), wrong, 0.5)
+    with pytest.raises(ValueError, match=r"^applied must be a"):
+        identifier.update(identifier.start(), 20.0, wrong)
+
+
 @pytest.mark.parametrize(("name", "value"), [("theta0", [1.0, 2.0]), ("P0", np.eye(2))])
 def test_a_start_that_does_not_fit_the_structure_is_named(name, value):
     with pytest.raises(ValueError, match=name):

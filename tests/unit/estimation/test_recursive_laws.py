@@ -11,13 +11,17 @@ import pytest
 from thermoctl.estimation import (
     CorrectedKalman,
     Estimate,
+    Guarded,
+    LinearModel,
     RandomWalkKalman,
     RecursiveLeastSquares,
+    StateKalman,
     VariableForgetting,
     start,
 )
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "estimators.json"
+WALK = LinearModel(np.eye(1), np.eye(1), 0.0, 1.0)
 LAWS = [
     RecursiveLeastSquares(0.95),
     VariableForgetting(5.0),
@@ -261,7 +265,7 @@ def test_a_drift_of_another_size_than_the_belief_is_named():
         *(
             ("R2", lambda law=law, v=v: law(R2=v))
             for law in (RandomWalkKalman, CorrectedKalman)
-            for v in (0.0, -1.0, math.nan, math.inf)
+            for v in (0.0, -1.0, math.nan, math.inf, 1e60, 1e-60, np.ones(1))
         ),
         *(
             ("R1", lambda law=law, v=v: law(R1=v))
@@ -305,13 +309,20 @@ def test_a_drift_of_another_size_than_the_belief_is_named():
         ),
         *(
             ("theta0", lambda v=v: start(2, theta0=v))
-            for v in ([1.0], [1.0, math.nan], np.ones((2, 1)), "ab", [True, False])
+            for v in ([1.0], [1.0, math.nan], np.ones((2, 1)), "ab", [True, False], [0, 1e60])
         ),
     ],
 )
-def test_a_constructor_names_the_argument_that_is_wrong(name, build):
-    with pytest.raises(ValueError, match=name):
+def test_a_constructor_names_the_argument_that_is_wrong_on_one_line(name, build):
+    with pytest.raises(ValueError, match=rf"^{name} must") as refusal:
         build()
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_number_past_all_use_is_refused_with_the_range_expected():
+    for R2 in (1e-60, 1e60):
+        with pytest.raises(ValueError, match=r"^R2 must be positive, from 1e-50 to 1e\+50, got 1e"):
+            RandomWalkKalman(R2=R2)
 
 
 def test_a_start_that_is_symmetric_but_for_rounding_is_made_symmetric():
@@ -331,10 +342,26 @@ def test_a_law_keeps_its_own_copy_of_its_constants():
 
 
 @by_law
-@pytest.mark.parametrize("y", [None, "3", "warm", 1j, [1.0, 2.0]])
+@pytest.mark.parametrize("y", [None, "3", "warm", 1j, True, np.True_, 10**400])
 def test_an_output_that_is_no_number_is_named(law, y):
-    with pytest.raises(ValueError, match="y must be a number, got "):
+    with pytest.raises(ValueError, match=r"^y must be a number, got ") as refusal:
         law.update(start(2), np.ones(2), y)
+    assert len(str(refusal.value)) < 300
+
+
+@by_law
+@pytest.mark.parametrize("belief", [None, StateKalman(WALK).start([0.0], 1.0)])
+def test_what_is_no_belief_is_named(law, belief):
+    for each in (law, Guarded(law)):
+        with pytest.raises(TypeError, match=r"^belief must be an Estimate, got "):
+            each.update(belief, np.ones(2), 1.0)
+
+
+@by_law
+def test_an_output_of_several_numbers_is_named(law):
+    for y in ([1.0, 2.0], np.ones(1)):
+        with pytest.raises(ValueError, match=r"^y must be a single number, got "):
+            law.update(start(2), np.ones(2), y)
 
 
 @by_law

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from thermoctl.estimation import LinearModel, StateKalman
+from thermoctl.estimation import LinearModel, MatrixFading, MultipleFading, StateKalman, start
 
 F = np.array([[0.9, 0.2], [-0.1, 0.8]])
 H = np.array([[0.0, 2.0]])
@@ -173,3 +173,17 @@ def test_a_belief_about_another_number_of_states_is_an_error():
     other = StateKalman(LinearModel(np.eye(3), np.eye(3)[:1], 0.0, 1.0))
     with pytest.raises(ValueError, match="belief must be one of 2 states, got 3"):
         StateKalman(MODEL).update(other.start(np.zeros(3), 1.0), 0.0)
+
+
+def test_a_belief_about_another_number_of_observations_is_an_error():
+    other = StateKalman(LinearModel(F, np.eye(2), 0.0, 1.0))
+    with pytest.raises(ValueError, match="belief must be one of 1 observations, got 2"):
+        StateKalman(MODEL).update(other.start(np.zeros(2), 1.0), 0.0)
+
+
+@pytest.mark.parametrize("filter_of", [StateKalman, MultipleFading, MatrixFading])
+def test_what_is_no_model_and_no_belief_is_named(filter_of):
+    with pytest.raises(TypeError, match=r"^model must be a LinearModel, got ndarray"):
+        filter_of(F)
+    with pytest.raises(TypeError, match=r"^belief must be a StateBelief, got Estimate"):
+        filter_of(MODEL).update(start(2), 0.0)
