@@ -75,6 +75,10 @@ PAPERS: Final = {
         "thermoctl.studies.papers.ozbek2021:Ozbek2021",
         "Follow a parameter that jumps, with seven estimators, as O21 did.",
     ),
+    "bicer2017": Paper(
+        "thermoctl.studies.papers.bicer2017:Bicer2017",
+        "Follow a drug through two compartments with a wrong model, as BO17 did.",
+    ),
 }
 """Studies by the name of their command."""
 

@@ -1,9 +1,7 @@
-r"""The simulation study of O21: which estimators follow a parameter that jumps.
+"""The simulation study of O21: which estimators follow a parameter that jumps.
 
-.. math:: y(t) = a(t)\, y(t-1) + v(t), \qquad v(t) \sim N(0, 1)
-
-with a = -0.9, from t = 101 on 0.9, and from t = 201 to 400 again -0.9. The paper shows one run in
-its Figures 1 to 18; here the first replication stands for it, and all of them for the table.
+The paper shows one run in its Figures 1 to 18; here the first replication stands for it, and all of
+them for the table.
 
 Implements section 2 of ``docs/theory.md``.
 """
@@ -17,61 +15,23 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from thermoctl.estimation import (
-    CorrectedKalman,
-    RandomWalkKalman,
-    RecursiveLeastSquares,
-    VariableForgetting,
-    run_batch,
-)
+from thermoctl.estimation import run_batch
 from thermoctl.estimation.batch import Run
-from thermoctl.estimation.recursion import ARRAYS, RecursiveLaw
+from thermoctl.estimation.recursion import ARRAYS
 from thermoctl.quantities import Array
-from thermoctl.studies.papers.study import Column, Outcome, Row, at_least_one, generator
-
-JUMPS: Final = (100, 200)
-"""Last samples before a jump."""
-
-SAMPLES: Final = 400
-POLE: Final = np.repeat((-0.9, 0.9, -0.9), np.diff((0, *JUMPS, SAMPLES)))
-"""a(t) at t = 1 to 400."""
-
-FIRST_OUTPUT: Final = 10.0
-P0: Final = 1.0
+from thermoctl.studies.papers.ozbek2021_figure import draw_ozbek2021
+from thermoctl.studies.papers.ozbek2021_methods import METHODS, P0, POLE, SAMPLES, Method, outputs
+from thermoctl.studies.papers.study import (
+    Column,
+    Outcome,
+    Row,
+    at_least_one,
+    generator,
+    not_negative,
+)
 
 BATCH: Final = 250
 """Replications computed together: nearly as fast as more, and Ctrl-C need not wait long."""
-
-
-@dataclass(frozen=True, slots=True)
-class Method:
-    """An estimator of the study.
-
-    Parameters
-    ----------
-    name : str
-        As it stands in the table.
-    law : RecursiveLaw
-        Estimator, with R1 = 0 and R2 = 1 where it has them.
-    figures : tuple of int, optional
-        Numbers of its figures in the paper: estimate, P and residuals.
-    """
-
-    name: str
-    law: RecursiveLaw
-    figures: tuple[int, int, int] | None = None
-
-
-METHODS: Final = (
-    Method("RLS 1", RecursiveLeastSquares(1.0), (1, 2, 3)),
-    Method("RLS 0.99", RecursiveLeastSquares(0.99), (4, 5, 6)),
-    Method("RLS 0.9", RecursiveLeastSquares(0.9), (7, 8, 9)),
-    Method("RLS 0.8", RecursiveLeastSquares(0.8), (10, 11, 12)),
-    Method("variable forgetting, Sigma0 10", VariableForgetting(10.0)),
-    Method("NKF", RandomWalkKalman(R1=0.0, R2=1.0), (14, 15, 17)),
-    Method("CKF", CorrectedKalman(R1=0.0, R2=1.0), (13, 16, 18)),
-)
-"""Rows of the table, in this order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,14 +43,14 @@ class Ozbek2021:
     replications : int
         Independent runs, at least 1.
     seed : int
-        Of all noise.
+        Of all noise, at least 0.
     batch : int
         Replications computed together, at least 1; it changes nothing but the time taken.
 
     Raises
     ------
     ValueError
-        `replications` or `batch` is no integer of at least 1.
+        `replications` or `batch` is no integer of at least 1, or `seed` none of at least 0.
     """
 
     replications: int = 1000
@@ -111,6 +71,7 @@ class Ozbek2021:
     def __post_init__(self) -> None:
         at_least_one("replications", self.replications)
         at_least_one("batch", self.batch)
+        not_negative("seed", self.seed)
 
     def run(self) -> Iterator[Outcome]:
         """Yield what is known after each batch of replications, at last the whole."""
@@ -128,19 +89,7 @@ class Ozbek2021:
 
     def draw(self, outcome: Outcome, files: Sequence[Path]) -> list[Path]:
         """Draw the page of the paper's figures into `files` and return what was written."""
-        from thermoctl.studies.papers.ozbek2021_figure import draw_ozbek2021
-
         return draw_ozbek2021(outcome, self.columns, self.seed, files)
-
-
-def outputs(noise: Sequence[Array]) -> Array:
-    """Return y(0) to y(400), shape (401, R), from v(1) to v(400) of R replications."""
-    v = np.stack(noise, axis=1)
-    y = np.empty((SAMPLES + 1, v.shape[1]))
-    y[0] = FIRST_OUTPUT
-    for t in range(SAMPLES):
-        y[t + 1] = POLE[t] * y[t] + v[t]  # O21 (24)
-    return y
 
 
 _WINDOWS: Final = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -9,23 +10,17 @@ from typing import Any, Final
 import numpy as np
 
 from thermoctl.studies import figure as house
-from thermoctl.studies.papers.present import shown
+from thermoctl.studies.papers.ozbek2021_methods import JUMPS, METHODS, SAMPLES
+from thermoctl.studies.papers.present import runs, shown
 from thermoctl.studies.papers.study import Column, Outcome
 
 HEIGHT_IN: Final = 10.3
 """With `house.WIDE_IN` it fits on A4 with margins of 13 mm."""
 
-ROWS: Final = (
-    ("Recursive least squares, λ = 1", (1, 2, 3)),
-    ("Recursive least squares, λ = 0.99", (4, 5, 6)),
-    ("Recursive least squares, λ = 0.9", (7, 8, 9)),
-    ("Recursive least squares, λ = 0.8", (10, 11, 12)),
-    ("Corrected Kalman filter", (13, 16, 18)),
-    ("Normal Kalman filter", (14, 15, 17)),
-)
-"""Methods as the paper has them, each with its estimate, its P and its residuals."""
+ROWS: Final = sorted((m.figures, m.title) for m in METHODS if m.figures is not None)
+"""Methods as the paper shows them one after the other: figures of estimate, P and residuals."""
 
-_LEFT, _RIGHT, _TOP, _BOTTOM = 0.075, 0.915, 0.9, 0.225
+_LEFT, _RIGHT, _TOP, _BOTTOM = 0.09, 0.975, 0.922, 0.228
 _TABLE = (_LEFT, 0.012, _RIGHT - _LEFT, 0.155)
 _COLUMNS: Final = (0.0, 0.44, 0.55, 0.66, 0.77, 0.885, 1.0)
 """Left edge of the table's first column, right edges of the others."""
@@ -56,21 +51,21 @@ def draw_ozbek2021(
     OSError
         If a file cannot be written.
     """
-    grid = {"sharex": True, "sharey": "col"}
+    grid = {"sharex": True}
     with house.styled(house.WIDE_IN, HEIGHT_IN, len(ROWS), 3, **grid) as (figure, axes):
         figure.subplots_adjust(
-            left=_LEFT, right=_RIGHT, top=_TOP, bottom=_BOTTOM, hspace=0.75, wspace=0.3
+            left=_LEFT, right=_RIGHT, top=_TOP, bottom=_BOTTOM, hspace=0.68, wspace=0.4
         )
-        for panels, (name, numbers) in zip(axes, ROWS, strict=True):
+        for panels, (numbers, name) in zip(axes, ROWS, strict=True):
             _draw_estimate(panels[0], outcome.figures[str(numbers[0])])
             _draw_variance(panels[1], outcome.figures[str(numbers[1])])
             _draw_residuals(panels[2], outcome.figures[str(numbers[2])])
             for panel, number in zip(panels, numbers, strict=True):
                 house.letter(panel, str(number))
-                for jump in (100, 200):
+                for jump in JUMPS:
                     panel.axvline(jump + 0.5, color=house.MUTE, linewidth=0.6, linestyle=":")
             _head(panels[0], name)
-        _write_axes(axes)
+        _write_axes(axes, max(map(abs, _every_residual(outcome))))
         _write_labels(axes)
         _write_title(figure, seed)
         _write_table(figure, outcome, columns)
@@ -105,6 +100,11 @@ def _draw_residuals(panel: Any, drawn: Mapping[str, Any]) -> None:
     house.score(panel, f"{100.0 * np.mean(~outside):.0f} % inside ±2√S")
 
 
+def _every_residual(outcome: Outcome) -> list[float]:
+    """Return all residuals that are drawn."""
+    return [e for (_, _, number), _ in ROWS for e in outcome.figures[str(number)]["values"]]
+
+
 def _head(panel: Any, name: str) -> None:
     """Write the name of a row above its first panel."""
     panel.annotate(
@@ -119,38 +119,38 @@ def _head(panel: Any, name: str) -> None:
     )
 
 
-def _write_axes(axes: Any) -> None:
+def _write_axes(axes: Any, largest_residual: float) -> None:
     """Give every column its scale, and every axis a name."""
-    for panel in axes[:, 0]:
-        panel.set(ylim=(-1.5, 1.5), yticks=(-0.9, 0.0, 0.9), ylabel="estimate of $a$")
-    for panel in axes[:, 1]:
-        panel.set(yscale="log", ylim=(2e-4, 2.0), ylabel="variance $P$")
-        panel.set_yticks((0.001, 0.01, 0.1, 1.0), ("0.001", "0.01", "0.1", "1"))
-        panel.minorticks_off()
-    for panel in axes[:, 2]:
-        panel.set(ylim=(-10.0, 10.0), yticks=(-10, -5, 0, 5, 10), ylabel="residual $e$")
+    end = max(10.0, 5.0 * math.ceil(largest_residual / 5.0))
+    for estimate, variance, residual in axes:
+        estimate.set(ylim=(-1.5, 1.5), yticks=(-0.9, 0.0, 0.9), ylabel="estimate of $a$")
+        variance.set(yscale="log", ylim=(1e-4, 2.0), ylabel="variance $P$")
+        variance.set_yticks((0.001, 0.01, 0.1, 1.0), ("0.001", "0.01", "0.1", "1"))
+        variance.minorticks_off()
+        residual.set(ylim=(-end, end), yticks=np.linspace(-end, end, 5), ylabel="residual $e$")
     for panel in axes[-1]:
-        panel.set(xlim=(0, 400), xticks=(0, 100, 200, 300, 400), xlabel="sample $t$")
+        panel.set(xlim=(0, SAMPLES), xticks=range(0, SAMPLES + 1, 100), xlabel="sample $t$")
 
 
 def _write_labels(axes: Any) -> None:
-    """Write once what the lines are."""
-    notes = {"xycoords": "data", "textcoords": "data", "fontsize": 7.5}
-    first = axes[0, 0]
-    for text, place, hue in (
-        ("true $a$", (208, 0.9), house.INK),
-        ("estimate ±2σ", (208, 0.1), house.BELIEF),
+    """Write once what the lines, the bands and the dots are, where the first row is empty."""
+    estimate, _, residual = axes[0]
+    top = residual.get_ylim()[1]
+    for panel, x, y, text, hue in (
+        (estimate, 95, 0.9, "true", house.INK),
+        (estimate, 208, 0.45, "estimate", house.BELIEF),
+        (estimate, 208, 0.0, "±2σ", house.BELIEF),
+        (residual, 208, 0.75 * top, "outside ±2√S", house.OUTSIDE),
     ):
-        first.annotate(text, xy=place, xytext=place, color=hue, va="center", **notes)
-    house.label(axes[0, 2], 0.0, "±2√S", house.MUTE)
-    house.label(axes[0, 2], 5.0, "outside", house.OUTSIDE)
+        side = "right" if x < 100 else "left"
+        panel.text(x, y, text, color=hue, fontsize=7.5, va="center", ha=side)
 
 
 def _write_title(figure: Any, seed: int) -> None:
     """Write what the page shows."""
     style = {"color": house.INK, "va": "center"}
     text = "Figures 1 to 18 of O21, repeated: one run of (24), seed"
-    figure.text(_LEFT, 0.975, f"{text} {seed}", fontsize=9, fontweight="bold", **style)
+    figure.text(_LEFT, 0.983, f"{text} {seed}", fontsize=9, fontweight="bold", **style)
 
 
 def _write_table(figure: Any, outcome: Outcome, columns: Sequence[Column]) -> None:
@@ -158,8 +158,8 @@ def _write_table(figure: Any, outcome: Outcome, columns: Sequence[Column]) -> No
     panel = figure.add_axes(_TABLE)
     panel.set(xlim=(0, 1), ylim=(0, 1))
     panel.axis("off")
-    runs = f"Mean over {outcome.replications:,} runs"
-    panel.text(0.0, 1.0, runs, fontsize=9, fontweight="bold", color=house.INK, va="top")
+    heading = f"Mean over {runs(outcome)}"
+    panel.text(0.0, 1.0, heading, fontsize=9, fontweight="bold", color=house.INK, va="top")
     pitch = 0.84 / (len(outcome.table) + 2)
     lines = [[column.heading for column in columns]]
     lines += [[shown(row[column.key], column) for column in columns] for row in outcome.table]

@@ -29,13 +29,17 @@ def outcome_json(study: Study, outcome: Outcome, files: Sequence[Path]) -> dict[
 def print_outcome(console: Console, study: Study, outcome: Outcome) -> None:
     """Print the title of `study`, how much it has seen, and its table."""
     spell = spelling(console)
-    runs = f"{outcome.replications:,} run{'s' if outcome.replications > 1 else ''}"
-    for line in (study.title, f"{runs}, seed {study.seed}"):
+    for line in (study.title, f"{runs(outcome)}, seed {study.seed}"):
         console.print(spell(line), style="none", markup=False, soft_wrap=True)
     table = empty_table(spell, *(column.heading for column in study.columns))
     for row in outcome.table:
         table.add_row(*(spell(shown(row[column.key], column)) for column in study.columns))
     print_table(console, table)
+
+
+def runs(outcome: Outcome) -> str:
+    """Return how many runs are behind `outcome`, in words."""
+    return f"{outcome.replications:,} run{'s' if outcome.replications > 1 else ''}"
 
 
 def shown(cell: Cell, column: Column) -> str:
