@@ -13,6 +13,7 @@ pytestmark = pytest.mark.e2e
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "thermoctl"
 COLUMNS = ("--time", "time_s", "--input", "heater", "--output", "water_c")
+AUTO = (*COLUMNS, "--order", "auto")
 
 
 @pytest.fixture
@@ -81,6 +82,16 @@ def test_json_has_one_object_and_errors_beside_it(thermoctl, recording):
     assert told["conditions"]["R2_source"].startswith("estimated")
 
 
+def test_the_record_may_choose_the_order_itself(thermoctl, recording, tmp_path):
+    came = thermoctl("replay", recording, *AUTO, "--json", "--plot", "a.png")
+    told = json.loads(came.stdout)
+    assert (came.returncode, told["chosen"]["delay"]) == (0, 1)
+    assert len(told["orders"]) == 72
+    assert (tmp_path / "a.png").stat().st_size > 10_000
+    few = thermoctl("replay", recording, *AUTO, "--candidates", "1-2,1,1-3")
+    assert "Orders   6 weighed on" in few.stdout
+
+
 def test_a_given_noise_and_a_kept_mean_are_said(thermoctl, recording):
     came = thermoctl("replay", recording, *COLUMNS, "--R2", "0.04", "--keep-mean")
     assert "R2 = 0.04 (sd 0.2), given" in came.stdout
@@ -143,7 +154,11 @@ def test_one_wild_value_ends_neither_in_a_traceback_nor_in_a_warning(thermoctl, 
         (("run.csv", "--output", "water"), 2, "run.csv has time_s, heater, water_c"),
         (("run.csv",), 2, "(--output); run.csv has time_s, heater, water_c"),
         (("run.csv", *COLUMNS, "--loop", "tank"), 1, "expected a history"),
-        (("run.csv", *COLUMNS, "--order", "2"), 2, "expected n,m,d such as 2,2,1; got '2'"),
+        (("run.csv", *COLUMNS, "--order", "2"), 2, "expected auto or n,m,d such as 2,2,1; got '2'"),
+        (("run.csv", *COLUMNS, "--candidates", "1,1,1"), 2, "only with --order auto"),
+        (("run.csv", *AUTO, "--candidates", "1,1"), 2, "n,m,d or ranges of them"),
+        (("run.csv", *AUTO, "--candidates", "1-9,1-9,1-9"), 2, "at most 200 candidates, got 729"),
+        (("run.csv", *AUTO, *2 * ("--candidates", "1,1,1")), 2, "repeats another"),
         (("run.csv", *COLUMNS, "--estimator", "x"), 2, "expected an estimator such as ckf"),
         (("run.csv", *COLUMNS, "--R2", "-1"), 2, "greater than zero, got '-1'"),
         (("run.csv", *COLUMNS, "--plot", "x.pdf"), 2, ".png or .svg, got 'x.pdf'"),

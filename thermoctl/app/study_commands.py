@@ -8,12 +8,15 @@ from pathlib import Path
 import click
 
 from thermoctl.app.options import FILE, Parsed, examples, positive_number
+from thermoctl.app.order_options import candidates_option, require_auto
 from thermoctl.app.results import console, print_json, say, write_figures
+from thermoctl.estimation import Order
 from thermoctl.model.arx import Arx
 from thermoctl.studies.csv_record import read_csv
 from thermoctl.studies.figure import FORMATS, require_matplotlib
 from thermoctl.studies.history_record import is_history, read_history_record
-from thermoctl.studies.laws import EXAMPLES, LawSpec, parse_law, parse_order
+from thermoctl.studies.laws import EXAMPLES, LawSpec, parse_law, parse_order_or_auto
+from thermoctl.studies.orders import USUAL, Weighing, weigh
 from thermoctl.studies.present import print_replay, replay_json
 from thermoctl.studies.record import ColumnError, Columns, Record, RecordError
 from thermoctl.studies.replay import replay
@@ -32,6 +35,7 @@ def _figure_file(text: str) -> Path:
     epilog=examples(
         "thermoctl replay history.sqlite --loop tank",
         "thermoctl replay run.csv --order 1,1,1 --estimator ckf --estimator rls:0.99",
+        "thermoctl replay run.csv --order auto --candidates 1-3,1-2,1-8",
     ),
 )
 @click.argument("file", type=FILE)
@@ -41,11 +45,12 @@ def _figure_file(text: str) -> Path:
 @click.option("--loop", metavar="NAME", help="Which loop, where a history holds several.")
 @click.option(
     "--order",
-    type=Parsed("n,m,d", parse_order),
+    type=Parsed("n,m,d|auto", parse_order_or_auto),
     default="2,2,1",
     show_default=True,
-    help="Past outputs, inputs, and delay in samples.",
+    help="Past outputs, inputs, and delay in samples; auto: what the record speaks for.",
 )
+@candidates_option
 @click.option(
     "--estimator",
     "laws",
@@ -83,7 +88,8 @@ def replay_command(
     input_column: str | None,
     output_column: str | None,
     loop: str | None,
-    order: Arx,
+    order: Arx | None,
+    candidates: Sequence[Order],
     laws: Sequence[LawSpec],
     noise: float | None,
     start_variance: float,
@@ -95,10 +101,14 @@ def replay_command(
 
     FILE is CSV with a line of column names, or a history written by thermoctl.
     """
+    require_auto(order, candidates)
     if plot:
         require_matplotlib()
     record = _read(file, Columns(output_column, input_column, time_column), loop)
-    result = replay(record, order, laws, R2=noise, P0=start_variance, keep_mean=keep_mean)
+    model: Arx | Weighing | None = order
+    if model is None:
+        model = weigh(record, candidates or USUAL, R2=noise, P0=start_variance, keep_mean=keep_mean)
+    result = replay(record, model, laws, R2=noise, P0=start_variance, keep_mean=keep_mean)
     if plot:
         write_figures(plot, lambda: draw_replay(result, list(plot)))
     if as_json:

@@ -14,6 +14,8 @@ from rich.table import Table
 
 from thermoctl.studies.experiment import Measures
 from thermoctl.studies.laws import parameter_names
+from thermoctl.studies.orders import Weighing
+from thermoctl.studies.orders_words import orders_json, orders_lines, orders_rows
 from thermoctl.studies.record import Record
 from thermoctl.studies.replay import Replay
 from thermoctl.studies.words import ascii_only, duration, is_utf8, number, probability
@@ -40,6 +42,7 @@ def replay_json(result: Replay) -> dict[str, Any]:
         "samples": len(result.record.t_s),
         "estimators": [_fields(score) for score in result.scores],
         "conditions": conditions,
+        **(orders_json(result.weighing) if result.weighing else {}),
     }
 
 
@@ -71,11 +74,22 @@ def print_replay(console: Console, result: Replay) -> None:
     spell = spelling(console)
     for line in (*_about_record(result.record), *_about_conditions(result)):
         console.print(spell(line), style="none", markup=False, soft_wrap=True)
+    if result.weighing:
+        print_orders(console, result.weighing)
     print_table(console, _prediction_table(result, spell))
     print_table(console, *_parameter_tables(result, spell))
     console.print()
     for line in _warnings(result):
         console.print(spell(line), markup=False, soft_wrap=True)
+
+
+def print_orders(console: Console, weighing: Weighing) -> None:
+    """Print the most probable orders, a row each."""
+    spell = spelling(console)
+    table = empty_table(spell, "order n,m,d", "probability")
+    for order, chance in orders_rows(weighing):
+        table.add_row(order, spell(chance))
+    print_table(console, table)
 
 
 def _about_record(record: Record) -> list[str]:
@@ -93,11 +107,13 @@ def _about_conditions(result: Replay) -> list[str]:
     c = result.conditions
     kept = "taken as recorded: mean kept, not scaled"
     if c.mean_removed:
+        how = "centred at rest" if result.weighing else "mean removed"
         kept = (
-            f"mean removed, scaled by the standard deviation: output {c.y_centre:.4g} ±"
+            f"{how}, scaled by the standard deviation: output {c.y_centre:.4g} ±"
             f" {c.y_scale:.4g}, input {c.u_centre:.4g} ± {c.u_scale:.4g}"
         )
     return [
+        *(orders_lines(result.weighing) if result.weighing else ()),
         f"Model    {c.order.n} past outputs, {c.order.m} inputs, delay {c.order.delay}; {kept}",
         f"Noise    R2 = {c.R2:.4g} (sd {math.sqrt(c.R2):.4g}), {c.R2_source}",
         f"Score    {c.scored:,} predictions from sample {c.scored_from + 1:,} on;"

@@ -19,12 +19,16 @@ from thermoctl.estimation import RecursiveLeastSquares, start
 from thermoctl.model.arx import Arx
 from thermoctl.quantities import Array
 from thermoctl.studies.laws import LawSpec, prepare
+from thermoctl.studies.orders import Weighing
 from thermoctl.studies.record import Record, RecordError
 from thermoctl.studies.scaled import Scaled, Scaling, robust_variance
 from thermoctl.studies.whiteness import FEWEST_SAMPLES, ljung_box
 
 NOISE_FORGETTING = 0.95
 """Forgetting factor of the first pass that estimates the noise."""
+
+WIDE_SOURCE = "estimated: robust spread of the errors of the model that holds every candidate"
+"""Where the noise comes from when orders were weighed."""
 
 FEWEST_SCORED = 10
 """Predictions a score needs."""
@@ -48,7 +52,8 @@ class Conditions:
     order : Arx
         Structure of the model.
     mean_removed : bool
-        Whether the record was centred and scaled.
+        Whether the record was centred and scaled; with orders weighed, the input is centred where
+        the mean of the output would be at rest.
     y_centre, y_scale, u_centre, u_scale : float
         Scaled output = (y - y_centre)/y_scale, and the input likewise.
     R2 : float
@@ -129,17 +134,21 @@ class Trace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Replay:
-    """Result of a replay: scores and traces in the order the laws were named."""
+    """Result of a replay: scores and traces in the order the laws were named.
+
+    `weighing` is what chose the order, where the record was asked to.
+    """
 
     record: Record
     conditions: Conditions
     scores: tuple[Score, ...]
     traces: tuple[Trace, ...]
+    weighing: Weighing | None = None
 
 
 def replay(
     record: Record,
-    order: Arx,
+    order: Arx | Weighing,
     laws: Sequence[LawSpec],
     *,
     R2: float | None = None,
@@ -153,8 +162,10 @@ def replay(
     ----------
     record : Record
         What was recorded.
-    order : Arx
-        Structure (n, m, delay) of the model; its own centre and scale are not used.
+    order : Arx or Weighing
+        Structure (n, m, delay) of the model, whose own centre and scale are not used; or what the
+        record says of several: its most probable one is taken, named as chosen or not, and its
+        scaling and noise with it.
     laws : sequence of LawSpec
         At least one.
     R2 : float, optional
@@ -176,20 +187,25 @@ def replay(
     for name, value in (("R2", R2), ("P0", P0)):
         if value is not None and not 0.0 < value < math.inf:
             raise ValueError(f"{name} must be positive and finite, got {value!r}")
-    scaled, conditions = _prepare(record, order, P0, keep_mean)
-    if R2 is None:
+    weighing = order if isinstance(order, Weighing) else None
+    structure = order.best.structure() if isinstance(order, Weighing) else order
+    scaling = weighing.scaling if weighing else Scaling.of(record, keep_mean=keep_mean)
+    scaled, conditions = _prepare(record, structure, scaling, P0)
+    if weighing:
+        R2, source = weighing.R2, "given" if R2 is not None else WIDE_SOURCE
+    elif R2 is None:
         R2 = _noise(scaled, conditions)
         source = f"estimated: robust spread of the errors of a first pass, RLS({NOISE_FORGETTING})"
     else:
         source = "given"
-    conditions = replace(conditions, R2=R2, R2_source=source)
+    conditions = replace(conditions, mean_removed=not keep_mean, R2=R2, R2_source=source)
     runs = [_run(scaled, conditions, law, timer) for law in laws]
-    return Replay(record, conditions, *zip(*runs, strict=True))
+    scores, traces = zip(*runs, strict=True)
+    return Replay(record, conditions, scores, traces, weighing)
 
 
-def _prepare(record: Record, order: Arx, P0: float, keep_mean: bool) -> tuple[Scaled, Conditions]:
-    """Centre and scale, and decide from where on predictions count."""
-    scaling = Scaling.of(record, keep_mean=keep_mean)
+def _prepare(record: Record, order: Arx, scaling: Scaling, P0: float) -> tuple[Scaled, Conditions]:
+    """Scale, and decide from where on predictions count."""
     y = scaling.outputs(record)
     scaled = Scaled.of(record, y, scaling.inputs(record), order)
     whole = len(scaled.whole)
@@ -203,7 +219,7 @@ def _prepare(record: Record, order: Arx, P0: float, keep_mean: bool) -> tuple[Sc
     counted = scaled.whole[learning:]
     return scaled, Conditions(
         order=order,
-        mean_removed=not keep_mean,
+        mean_removed=False,
         y_centre=scaling.y_centre,
         y_scale=scaling.y_scale,
         u_centre=scaling.u_centre,

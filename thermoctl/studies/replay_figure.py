@@ -11,11 +11,12 @@ import numpy.typing as npt
 from thermoctl.quantities import Array
 from thermoctl.studies import figure as house
 from thermoctl.studies.laws import parameter_names
-from thermoctl.studies.record import GAP
+from thermoctl.studies.orders_figure import draw_posterior
+from thermoctl.studies.record import GAP, Record
 from thermoctl.studies.replay import Replay, Trace
 from thermoctl.studies.words import number, probability
 
-_RECORD_IN, _PARAMETER_IN, _INNOVATION_IN = (1.25, 0.6), 0.95, 0.8
+_RECORD_IN, _ORDERS_IN, _PARAMETER_IN, _INNOVATION_IN = (1.25, 0.6), 0.95, 0.95, 0.8
 _TOP_IN, _BOTTOM_IN, _SPACE_IN = 0.45, 0.5, 0.33
 
 _BAND_SHARE = 0.9
@@ -44,7 +45,10 @@ def draw_replay(result: Replay, paths: list[Path]) -> list[Path]:
         If a file cannot be written.
     """
     names = parameter_names(result.conditions.order)
-    heights = [*_RECORD_IN, *[_PARAMETER_IN] * len(names), *[_INNOVATION_IN] * len(result.scores)]
+    orders = [_ORDERS_IN] if result.weighing else []
+    first = len(_RECORD_IN) + len(orders)
+    heights = [*_RECORD_IN, *orders, *[_PARAMETER_IN] * len(names)]
+    heights += [_INNOVATION_IN] * len(result.scores)
     height = sum(heights) + _SPACE_IN * (len(heights) - 1) + _TOP_IN + _BOTTOM_IN
     grid = {"sharex": True, "height_ratios": heights}
     with house.styled(house.WIDE_IN, height, len(heights), 1, **grid) as (figure, axes):
@@ -57,11 +61,13 @@ def draw_replay(result: Replay, paths: list[Path]) -> list[Path]:
         )
         panels = list(axes[:, 0])
         unit_s, unit = _time_unit(result)
-        _draw_record(result, panels[0], panels[1], unit_s)
+        draw_record(result.record, panels[0], panels[1], unit_s)
+        if result.weighing:
+            draw_posterior(panels[2], result.weighing, result.record, unit_s)
         for place, name in enumerate(names):
-            _draw_parameter(result, place, name, panels[2 + place], unit_s)
+            _draw_parameter(result, place, name, panels[first + place], unit_s)
         for place in range(len(result.scores)):
-            _draw_innovations(result, place, panels[2 + len(names) + place], unit_s)
+            _draw_innovations(result, place, panels[first + len(names) + place], unit_s)
         for index, panel in enumerate(panels):
             house.letter(panel, _letter(index))
         duration = result.record.t_s[-1] / unit_s
@@ -83,9 +89,8 @@ def _time_unit(result: Replay) -> tuple[float, str]:
     return house.time_unit(float(result.record.t_s[-1]))
 
 
-def _draw_record(result: Replay, output: Any, entry: Any, unit_s: float) -> None:
+def draw_record(record: Record, output: Any, entry: Any, unit_s: float) -> None:
     """Draw what was recorded: output as a line, input as steps with area."""
-    record = result.record
     longest = GAP * record.period_s / unit_s
     t, y = house.broken(record.t_s / unit_s, record.y, longest)
     output.plot(*house.envelope(t, y), color=house.INK)

@@ -8,6 +8,7 @@ from thermoctl.studies import replay as replay_module
 from thermoctl.studies.laws import parse_law
 from thermoctl.studies.record import Columns, Record, RecordError
 from thermoctl.studies.replay import FEWEST_SCORED, TRACE_LENGTH, replay
+from thermoctl.studies.scaled import Scaled
 
 THETA = (-1.5, 0.56, 0.3, 0.2)
 ORDER = Arx(2, 2, 1)
@@ -117,8 +118,7 @@ def test_the_mean_is_removed_unless_it_is_to_be_kept():
 def test_regressors_are_those_of_the_model():
     record = recorded(samples=400)
     order = Arx(2, 3, 2)
-    scaled, _ = replay_module._prepare(record, order, 100.0, keep_mean=True)
-    seen = [(phi, y) for _, phi, y in scaled.samples()]
+    seen = [(phi, y) for _, phi, y in Scaled.of(record, record.y, record.u, order).samples()]
     assert len(seen) == 400 - 4
     for t, (phi, y) in enumerate(seen, start=4):
         expected = order.regressor(record.y[:t][::-1], record.u[:t][::-1])
