@@ -133,7 +133,7 @@ def _jump_k(loop: LoopTable) -> float:
 def _structure(table: ModelTable, period_s: float) -> Arx | KnownGain:
     if table.structure == "known-gain":
         return KnownGain(table.gain_k_per_s * period_s)
-    return Arx(table.n, table.m, y_centre_c=table.centre_c, y_scale_k=table.scale_k)
+    return Arx(table.n, table.m, table.delay, y_centre_c=table.centre_c, y_scale_k=table.scale_k)
 
 
 def _identifier(loop: LoopTable, structure: Arx | KnownGain, reference_time_s: float) -> Identifier:
@@ -160,12 +160,14 @@ def _first_guess(structure: Arx | KnownGain, gain_k: float) -> tuple[float, ...]
     """Return theta of a plant without loss, which keeps its temperature and which power heats.
 
     Zeros would be a plant without gain: no power could be computed from it, and without power the
-    gain is never learnt.
+    gain is never learnt. Each b is half of the one before, so that the zeros of B lie inside the
+    unit circle, and a law that refuses others can begin.
     """
     if isinstance(structure, KnownGain):
         return (1.0,)
-    b = gain_k / structure.m * structure.u_scale / structure.y_scale_k
-    return (-1.0,) + (0.0,) * (structure.n - 1) + (b,) * structure.m
+    shares = [0.5**i for i in range(structure.m)]
+    b = gain_k / sum(shares) * structure.u_scale / structure.y_scale_k
+    return (-1.0, *(0.0,) * (structure.n - 1), *(share * b for share in shares))
 
 
 def _guarded(
@@ -205,7 +207,8 @@ def _covariance_max(
 def _controller(table: LoopTable, structure: Arx | KnownGain) -> Controller:
     law = plugins.find(plugins.CONTROLLERS, table.controller.kind)
     known, options = plugins.option_names(law), dict(table.controller.options)
-    injected: dict[str, Any] = {"structure": structure} if "structure" in known else {}
+    given: dict[str, Any] = {"structure": structure, "period_s": table.period_s}
+    injected = {name: value for name, value in given.items() if name in known}
     if isinstance(structure, Arx) and table.estimator.guards.enabled and "gain_min_k" in known:
         options.setdefault("gain_min_k", _ARX_GAIN_SHARE * _gain_k(table))
     controller: Controller = plugins.build(law, options, **injected)

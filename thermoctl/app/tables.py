@@ -128,10 +128,19 @@ class ModelTable(Table):
     )
     n: int = Field(2, ge=1, le=10, description="arx: how many past temperatures.")
     m: int = Field(2, ge=1, le=10, description="arx: how many past powers.")
+    delay: int = Field(
+        1, ge=1, le=120, description="arx: samples from a power to its first effect; 1: the next."
+    )
     centre_c: Celsius = Field(
         20.0, description="arx: temperatures are counted from here; where the plant rests at 0 W."
     )
     scale_k: Positive = Field(1.0, description="arx: temperatures are counted in units of this.")
+
+    @model_validator(mode="after")
+    def _a_known_gain_acts_at_once(self) -> Self:
+        if self.structure == "known-gain" and self.delay != 1:
+            raise ValueError(f"a delay of {self.delay} samples needs structure 'arx'")
+        return self
 
 
 class LoopTable(Table):

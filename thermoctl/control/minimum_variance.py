@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
 
 import numpy as np
 
+from thermoctl.control.lasting import Lasting
+from thermoctl.control.prediction import foresee, predict
 from thermoctl.model.arx import Arx, KnownGain
 from thermoctl.ports import Situation
 from thermoctl.quantities import Array, clamp, is_finite_number
@@ -23,25 +25,44 @@ HOLDING_SD_MAX = 0.05
 
 
 @dataclass(frozen=True, slots=True)
+class Conditions:
+    """What the law has met of late and a person should know.
+
+    Parameters
+    ----------
+    zeros : Lasting
+        Zeros of B that must not be cancelled.
+    gain : Lasting
+        A gain below its bound, or of the wrong sign.
+    """
+
+    zeros: Lasting = field(default_factory=Lasting)
+    gain: Lasting = field(default_factory=Lasting)
+
+
+@dataclass(frozen=True, slots=True)
 class SelfTuningMinimumVariance:
-    r"""The certainty-equivalent minimum variance law of O21 (23), delay one.
+    r"""The certainty-equivalent minimum variance law of O21 (23), for any delay.
 
     .. math::
 
-        u(t) = [a_1 y(t) + \dots + a_n y(t-n+1) - b_2 u(t-1) - \dots - b_m u(t-m+1)
-                + y^*(t+1)] / b_1
+        u(t) = [a_1 \hat y(t+d-1) + \dots + a_n \hat y(t+d-n) - b_2 u(t-1) - \dots
+                - b_m u(t-m+1) + y^*(t+d)] / b_1
 
-    with the latest estimates and the inputs that were applied. For the structure of (27) it is
-    ``u = (y* - a y)/b``. The result is a power fraction and is NOT bounded here.
+    with the latest estimates, the inputs that were applied, and temperatures that are measured up
+    to y(t) and predicted beyond (`thermoctl.control.prediction`); with delay d = 1 all of them are
+    measured. For the structure of (27) it is ``u = (y* - a y)/b``. The result is a power fraction
+    and is NOT bounded here.
 
     Parameters
     ----------
     structure : Arx or KnownGain
-        The model whose parameters ``situation.estimate`` holds; delay 1, at least one input.
+        The model whose parameters ``situation.estimate`` holds; at least one input.
     reference_time_s : float
-        Tc: ``y* = y + (r - y) h/Tc``, so that an error is removed within Tc instead of within one
-        sample of h seconds; three times the lag that the model does not know. 0 is the law as
-        printed, ``y* = r``.
+        Tc: ``y* = y + (r - y) h/Tc`` with the y one sample before, ``y(t+d-1)`` as predicted, so
+        that an error is removed within Tc after the delay instead of within one sample of h
+        seconds; three times the lag that the model does not know. 0 is the law as printed,
+        ``y* = r``.
     gain_min_k : float
         Least b1, in K a sample at full power. A smaller or negative estimate is taken for this
         (projection: power heats). 0 leaves b1 as it is estimated.
@@ -49,27 +70,30 @@ class SelfTuningMinimumVariance:
         Zeros of B at this distance from the origin or beyond are not cancelled: the past inputs
         are then taken to be the one that is sought, ``u = (... + y*)/(b1 + ... + bm)``, which has
         the same steady state and no recursion in u that could grow. Infinite: always cancel.
+    on_zeros : str
+        What such zeros do: ``detune`` as above, or ``refuse``: no power while there are any.
 
     Raises
     ------
     TypeError
         `structure` is of another kind.
     ValueError
-        The structure has no input or a delay other than 1, or a number is out of its range.
+        The structure has no input, or another argument is out of its range.
     """
 
     structure: Arx | KnownGain
     reference_time_s: float = 0.0
     gain_min_k: float = 0.0
     zero_radius: float = 1.0
+    on_zeros: Literal["detune", "refuse"] = "detune"
 
     name: ClassVar[str] = "self-tuning-mv"
 
     def __post_init__(self) -> None:
         if not isinstance(self.structure, Arx | KnownGain):
             raise TypeError(f"structure must be Arx or KnownGain, got {self.structure!r}")
-        if isinstance(self.structure, Arx) and (self.structure.m < 1 or self.structure.delay != 1):
-            raise ValueError(f"structure must have an input and delay 1, got {self.structure}")
+        if isinstance(self.structure, Arx) and self.structure.m < 1:
+            raise ValueError(f"structure must have an input, got {self.structure}")
         for name in ("reference_time_s", "gain_min_k"):
             value = getattr(self, name)
             if not is_finite_number(value) or value < 0.0:
@@ -77,59 +101,83 @@ class SelfTuningMinimumVariance:
         limited = is_finite_number(self.zero_radius) and self.zero_radius > 0.0
         if not limited and self.zero_radius != math.inf:
             raise ValueError(f"zero_radius must be positive, got {self.zero_radius!r}")
+        if self.on_zeros not in ("detune", "refuse"):
+            raise ValueError(f"on_zeros must be 'detune' or 'refuse', got {self.on_zeros!r}")
 
-    def start(self) -> None:
-        """Return None: all that is remembered are the estimate and the applied inputs."""
+    def start(self) -> Conditions:
+        """Return that nothing was met; the model and its past are in the situation."""
+        return Conditions()
 
-    def observe(self, belief: None, situation: Situation) -> None:
-        """Return None: the identifier learns, and the situation holds what it has learnt."""
+    def observe(self, belief: Conditions, situation: Situation) -> Conditions:
+        """Return what the parameters of this sample are a case of."""
+        zero, gain_k = self._zero_and_gain(situation.estimate.theta)
+        zeros = gain = ""
+        if zero >= self.zero_radius:
+            zeros = f"expected zeros of B within radius {self.zero_radius:g}, got one at {zero:.3g}"
+        if gain_k < self.gain_min_k:
+            least = f"{self.gain_min_k:.3g} K a sample at full power"
+            gain = f"expected at least {least}, got {gain_k:.3g}"
+        return Conditions(belief.zeros.after(zeros), belief.gain.after(gain))
 
-    def decide(self, belief: None, situation: Situation) -> tuple[None, float]:
+    def decide(self, belief: Conditions, situation: Situation) -> tuple[Conditions, float]:
         """Return the next interval's power, unbounded; NaN when not known."""
         y, r = situation.temperature_c, situation.setpoint_c
         if not (math.isfinite(y) and math.isfinite(r)):
-            return None, math.nan
-        reference_c = r
-        if self.reference_time_s > 0.0:
-            reference_c = y + (r - y) * min(1.0, situation.interval_s / self.reference_time_s)
-        theta = situation.estimate.theta
+            return belief, math.nan
         if isinstance(self.structure, KnownGain):
-            power = (reference_c - float(theta[0]) * y) / self._gain(self.structure.b_k)
+            a = float(situation.estimate.theta[0])
+            gain_k = self._bounded(self.structure.b_k)
+            power = (self._reference(y, situation) - a * y) / gain_k  # O21 (27)
         else:
-            power = self._power(self.structure, situation, reference_c)
-        return None, power if math.isfinite(power) else math.nan
+            power = self._power(self.structure, situation)
+        return belief, power if math.isfinite(power) else math.nan
 
-    def _power(self, structure: Arx, situation: Situation, reference_c: float) -> float:
-        """Return the power for which ``Arx`` predicts `reference_c`; O21 (23).
+    def _reference(self, before_c: float, situation: Situation) -> float:
+        """Return y*, where the temperature of one sample before is `before_c`."""
+        if self.reference_time_s == 0.0:
+            return situation.setpoint_c
+        share = min(1.0, situation.interval_s / self.reference_time_s)
+        return before_c + (situation.setpoint_c - before_c) * share
+
+    def _power(self, structure: Arx, situation: Situation) -> float:
+        """Return the power for which ``Arx`` predicts the reference; O21 (23).
 
         Before the start the plant is taken to have rested, and in a gap of the readings to have
         been where it is now: without a power for so long as n samples it would never be learnt.
         """
         n, theta = structure.n, situation.estimate.theta
-        y_past_c = _known(situation.y_past_c, situation.temperature_c)
-        if n > 0:
-            y_past_c = np.concatenate(((situation.temperature_c,), y_past_c[1:n]))
-        b = theta[n:]
-        cancel = _zeros_inside(b, self.zero_radius)
-        u_past = np.concatenate(((0.0,), _known(situation.u_past, 0.0)[: structure.m - 1]))
-        if not cancel:
-            u_past[:] = 0.0
-        if len(y_past_c) < n or len(u_past) < structure.m:
+        now_c = situation.temperature_c
+        y_past_c = np.concatenate(((now_c,), _known(situation.y_past_c, now_c)[1:n]))
+        u_past = _known(situation.u_past, 0.0)
+        if len(y_past_c) < n or len(u_past) < structure.delay + structure.m - 2:
             return math.nan
-        per_power_k = structure.y_scale_k / structure.u_scale
-        gain_k = self._gain(float(b[0] if cancel else b.sum()) * per_power_k)
-        if gain_k == 0.0:
+        zero, gain_k = self._zero_and_gain(theta)
+        detuned, gain_k = zero >= self.zero_radius, self._bounded(gain_k)
+        if gain_k == 0.0 or (detuned and self.on_zeros == "refuse"):
             return math.nan
-        free_c = structure.temperature(
-            float(theta.dot(structure.regressor(y_past_c, u_past))), u_past
-        )
-        return (reference_c - free_c) / gain_k  # O21 (23)
+        y_past_c, u_past = foresee(structure, theta, y_past_c, u_past, structure.delay - 1)
+        u_sought = np.concatenate(((0.0,), np.zeros_like(u_past) if detuned else u_past))
+        free_c = predict(structure, theta, y_past_c, u_sought)
+        return (self._reference(float(y_past_c[0]), situation) - free_c) / gain_k  # O21 (23)
 
-    def _gain(self, gain_k: float) -> float:
+    def _zero_and_gain(self, theta: Array) -> tuple[float, float]:
+        """Return how far out B has a zero, and the gain in K with or without cancelling it.
+
+        Where every zero is to be cancelled nobody looks for one, and 0 stands for it.
+        """
+        structure = self.structure
+        if isinstance(structure, KnownGain):
+            return 0.0, structure.b_k
+        b = theta[structure.n :]
+        zero = 0.0 if self.zero_radius == math.inf else _farthest_zero(b)
+        per_power_k = structure.y_scale_k / structure.u_scale
+        return zero, float(b[0] if zero < self.zero_radius else b.sum()) * per_power_k
+
+    def _bounded(self, gain_k: float) -> float:
         """Return the gain projected onto what power can do, when a bound is known."""
         return max(gain_k, self.gain_min_k) if self.gain_min_k > 0.0 else gain_k
 
-    def beliefs(self, belief: None, situation: Situation) -> Beliefs:
+    def beliefs(self, belief: Conditions, situation: Situation) -> Beliefs:
         """Return gain, pole and holding power, as far as the structure has them."""
         theta, P = situation.estimate.theta, situation.estimate.P
         h, structure = situation.interval_s, self.structure
@@ -168,13 +216,15 @@ class SelfTuningMinimumVariance:
             return None
         return clamp(power, 0.0, 1.0)
 
-    def ride_s(self, belief: None) -> float:
+    def ride_s(self, belief: Conditions) -> float:
         """Return how long the model may steer without a sensor: Tc, at most 60 s."""
         return min(self.reference_time_s, RIDE_MAX_S)
 
-    def remarks(self, belief: None) -> Mapping[str, str]:
-        """Return nothing."""
-        return {}
+    def remarks(self, belief: Conditions) -> Mapping[str, str]:
+        """Return which zeros or which gain the law does not like, if any."""
+        zeros = "controller.detuned" if self.on_zeros == "detune" else "controller.refused"
+        found = ((zeros, belief.zeros), ("controller.gain_doubtful", belief.gain))
+        return {name: condition.text for name, condition in found if condition.stands}
 
 
 def _known(past: Array, otherwise: float) -> Array:
@@ -182,13 +232,13 @@ def _known(past: Array, otherwise: float) -> Array:
     return np.where(np.isnan(past), otherwise, past)
 
 
-def _zeros_inside(b: Array, radius: float) -> bool:
-    """Return whether all zeros of B, b1 z^(m-1) + ... + bm, lie within `radius`."""
-    if len(b) == 1 or radius == math.inf or not np.isfinite(b).all():
-        return True
+def _farthest_zero(b: Array) -> float:
+    """Return the largest modulus of a zero of B, b1 z^(m-1) + ... + bm; 0 when there is none."""
+    if len(b) == 1 or not np.isfinite(b).all():
+        return 0.0
     if b[0] == 0.0:  # a zero at infinity
-        return not b[1:].any()
-    return bool(np.abs(np.roots(b)).max(initial=0.0) < radius)
+        return math.inf if b[1:].any() else 0.0
+    return float(np.abs(np.roots(b)).max(initial=0.0))
 
 
 def _sd(P: Array, slope: Array) -> float:

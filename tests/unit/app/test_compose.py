@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 
+import numpy as np
 import pytest
 
 from thermoctl.app.compose import loop_for, regulator_for, started_as, wiring_errors
@@ -61,10 +62,24 @@ def test_the_known_gain_is_counted_per_sample(minimal):
 
 
 def test_structure_arx_has_the_orders_that_are_given(minimal):
-    minimal["loops"]["tank"]["model"] = {"structure": "arx", "n": 3, "m": 1}
+    minimal["loops"]["tank"]["model"] = {"structure": "arx", "n": 3, "m": 1, "delay": 4}
     structure = plan_for(load(minimal).loops["tank"]).identifier.structure
     assert isinstance(structure, Arx)
-    assert (structure.n, structure.m) == (3, 1)
+    assert (structure.n, structure.m, structure.delay) == (3, 1, 4)
+
+
+def test_a_known_gain_has_no_delay(minimal):
+    minimal["loops"]["tank"]["model"] = {"delay": 2}
+    with pytest.raises(ConfigError, match="a delay of 2 samples needs structure 'arx'"):
+        load(minimal)
+
+
+@pytest.mark.parametrize("m", [1, 2, 3, 10])
+def test_the_first_guess_is_one_that_a_law_can_begin_with(minimal, m):
+    minimal["loops"]["tank"]["model"] = {"structure": "arx", "m": m, "gain_k_per_s": 0.1}
+    b = plan_for(load(minimal).loops["tank"]).identifier.start().estimate.theta[2:]
+    assert b.sum() == pytest.approx(0.1)
+    assert np.abs(np.roots(b)).max(initial=0.0) < 0.9
 
 
 @pytest.mark.parametrize("guarded", [True, False])

@@ -246,12 +246,12 @@ def test_it_may_steer_without_a_sensor_for_three_lags_up_to_a_minute(reference_t
     [
         (TypeError, "structure", {"structure": "arx"}),
         (ValueError, "structure", {"structure": Arx(1, 0)}),
-        (ValueError, "structure", {"structure": Arx(1, 1, delay=2)}),
         *(
             (ValueError, "reference_time_s", {"reference_time_s": v})
             for v in (-1.0, math.nan, math.inf)
         ),
         *((ValueError, "gain_min_k", {"gain_min_k": v}) for v in (-1.0, math.nan, math.inf)),
+        *((ValueError, "on_zeros", {"on_zeros": v}) for v in ("cancel", None, True)),
         *((ValueError, "zero_radius", {"zero_radius": v}) for v in (0.0, -1.0, math.nan, None)),
     ],
 )
