@@ -30,10 +30,9 @@ def last(study):
 @pytest.fixture(scope="module")
 def three():
     """Three replications, of which an outcome is yielded after every one."""
-    patch = pytest.MonkeyPatch()
-    patch.setattr(bicer2017, "BATCH", 1)
-    yield list(Bicer2017(3).run())
-    patch.undo()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bicer2017, "BATCH", 1)
+        return list(Bicer2017(3).run())
 
 
 def test_the_table_has_the_sums_of_squared_errors_that_the_theory_gives(three):

@@ -43,7 +43,7 @@ BATCH: Final = 5
 
 
 def transition(c1: float, c2: float) -> Array:
-    """Return the matrix of (34), shape (2, 2), for rates of absorption and of elimination."""
+    """Return the matrix of (34), shape (2, 2), for the rates of gut and blood."""
     gut, blood = c1 * PERIOD, c2 * PERIOD
     return np.array([[1.0 - gut, 0.0], [gut, 1.0 - blood]])  # BO17 (34)
 
@@ -174,7 +174,7 @@ class Totals:
 
 @dataclass(frozen=True, slots=True)
 class Bicer2017:
-    """The compartment study of BO17, with Figures 1 to 5 and a comparison under an exact model.
+    """The compartment study of BO17, and what becomes of it with an exact model.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ class Bicer2017:
         not_negative("seed", self.seed)
 
     def run(self) -> Iterator[Outcome]:
-        """Yield what is known after each batch of replications; the last one is the whole."""
+        """Yield what is known after each batch of replications; the last is the whole."""
         scenarios = table_1(), exact_model()
         wrong, exact = ({name: Totals() for name in each.laws} for each in scenarios)
         for replication in range(self.replications):

@@ -1,4 +1,4 @@
-"""The page of the compartment study: Figures 1 to 5 of BO17, and what an exact model changes."""
+"""The page of the compartment study: Figures 1 to 5 of BO17, and an exact model."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Figure = Mapping[str, Any]
 
 
 def draw_page(outcome: Outcome, title: str, files: Sequence[Path]) -> list[Path]:
-    """Draw the figures of `outcome` on one page, write it to each of `files` and return these.
+    """Draw the figures of `outcome` on one page, into each of `files`; return these.
 
     Raises
     ------

@@ -67,7 +67,7 @@ class Study(Protocol):
     seed: int
 
     def run(self) -> Iterator[Outcome]:
-        """Yield what is known after each batch of replications; the last one is the whole."""
+        """Yield what is known after each batch of replications; the last is the whole."""
         ...
 
     def draw(self, outcome: Outcome, files: Sequence[Path]) -> list[Path]:
