@@ -31,7 +31,7 @@ class Lasting:
     text: str = ""
 
     def after(self, text: str) -> Lasting:
-        """Return the condition after one more sample; `text` is empty where it was not met."""
+        """Return the condition after one more sample; empty `text`: it was not met."""
         if bool(text) is self.stands:
             return replace(self, contrary=0) if self.contrary else self
         if self.contrary + 1 < (GONE_AFTER if self.stands else APPEARS_AFTER):
