@@ -31,6 +31,7 @@ _COMMANDS: Final = {
     "simulate": "thermoctl.app.board_commands:simulate",
     "replay": "thermoctl.app.study_commands:replay_command",
     "reproduce": "thermoctl.app.reproduce_commands:reproduce",
+    "compare": "thermoctl.app.compare_command:compare",
 }
 
 

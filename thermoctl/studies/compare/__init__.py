@@ -1,0 +1,1 @@
+"""Controllers against each other: the same plants, the same mishaps, known bounds."""

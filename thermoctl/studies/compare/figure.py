@@ -1,0 +1,180 @@
+"""The page of a comparison: every figure a point with a line to its 95 %."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from thermoctl.studies import figure as house
+from thermoctl.studies.compare.goals import Goal
+from thermoctl.studies.compare.plants import FLEETS
+from thermoctl.studies.compare.score import MEASURES
+from thermoctl.studies.compare.summary import Line, Score
+
+MOST_DRAWN = len(house.HUES)
+"""Controllers in one figure; one more could not be told from the others in grey."""
+
+MARKERS = ("o", "s", "D", "^")
+
+_ROW_IN, _MARGIN_IN, _GAP_IN = 0.30, 0.62, 0.62
+_BESIDE = 0.17
+_RATIOS, _KELVIN, _TRAVEL = "times the bound", "K", "full ranges a minute"
+
+
+def draw_comparison(
+    lines: Sequence[Line], controllers: Sequence[str], paths: Sequence[Path]
+) -> list[Path]:
+    """Draw every line of a comparison, and return what was written.
+
+    Parameters
+    ----------
+    lines : sequence of Line
+        What is known.
+    controllers : sequence of str
+        Names; the first `MOST_DRAWN` of them are drawn.
+    paths : sequence of Path
+        Files, each ending in .png or .svg.
+
+    Raises
+    ------
+    Unavailable
+        If matplotlib is not installed.
+    ValueError
+        If a suffix is neither .png nor .svg.
+    OSError
+        If a file cannot be written.
+    """
+    drawn = list(controllers[:MOST_DRAWN])
+    panels = _panels(lines)
+    rows = [len(own) for _, own in panels]
+    gaps_in = _GAP_IN * (len(rows) - 1)
+    height_in = _ROW_IN * sum(rows) + gaps_in + 2.0 * _MARGIN_IN + 0.14 * len(drawn)
+    with house.styled(house.WIDE_IN, height_in, len(panels), 1, height_ratios=rows) as (page, axes):
+        top_in = _MARGIN_IN + 0.14 * len(drawn)
+        page.subplots_adjust(
+            left=0.30,
+            right=0.965,
+            top=1.0 - top_in / height_in,
+            bottom=_MARGIN_IN / height_in,
+            hspace=_GAP_IN / (_ROW_IN * sum(rows) / len(rows)),
+        )
+        for index, (unit, own) in enumerate(panels):
+            panel = axes[index, 0]
+            _draw_panel(panel, own, drawn, unit)
+            house.letter(panel, "abc"[index])
+        _write_head(page, lines, drawn, height_in)
+        return [house.save(page, path) for path in paths]
+
+
+def _panels(lines: Sequence[Line]) -> list[tuple[str, list[Line]]]:
+    """Return the lines of each panel under its unit; only panels that have lines."""
+    sorted_by: dict[str, list[Line]] = {_RATIOS: [], _KELVIN: [], _TRAVEL: []}
+    for line in lines:
+        if line.bound is not None:
+            sorted_by[_RATIOS].append(line)
+        else:
+            sorted_by[_TRAVEL if line.measure == "travel_per_min" else _KELVIN].append(line)
+    return [(unit, own) for unit, own in sorted_by.items() if own]
+
+
+def _draw_panel(panel: Any, lines: Sequence[Line], drawn: Sequence[str], unit: str) -> None:
+    """Draw one row for each line, in it one point for each controller."""
+    figures = [
+        value
+        for line in lines
+        for name in drawn
+        if name in line.scores
+        for value in _ends(line.scores[name])
+        if math.isfinite(value) and value > 0.0
+    ]
+    low, high = (min(figures), max(figures)) if figures else (1.0, 1.0)
+    low = min(low, *(goal.at_most for line in lines for goal in line.goals), high)
+    low, high = (0.9 if unit == _RATIOS else low / 1.3), high * 1.4
+    panel.set_xscale("log")
+    panel.set_xlim(low, high)
+    panel.set_ylim(len(lines) - 0.4, -0.6)
+    for row, line in enumerate(lines):
+        panel.axhline(row + 0.5, color=house.ALLOWED, linewidth=0.4, zorder=0)
+        for goal in line.goals:
+            _draw_goal(panel, row, goal, line)
+        for place, name in enumerate(drawn):
+            if name in line.scores:
+                offset = _BESIDE * (place - 0.5 * (len(drawn) - 1))
+                _draw_score(panel, row + offset, line.scores[name], place, low)
+    if unit == _RATIOS:
+        panel.axvline(1.0, color=house.INK, linewidth=0.8)
+    panel.set_yticks(range(len(lines)), [_row_name(line) for line in lines])
+    panel.tick_params(axis="y", length=0)
+    panel.set_xlabel(unit, labelpad=2)
+    _plain_ticks(panel)
+
+
+def _plain_ticks(panel: Any) -> None:
+    """Count a logarithmic axis in plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    panel.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _ends(score: Score) -> tuple[float, float]:
+    return score.shown["median"], score.shown["p95"]
+
+
+def _draw_score(panel: Any, y: float, score: Score, place: int, low: float) -> None:
+    """Draw a point at the median and a line to the 95 %; what is never reached points right."""
+    hue, (median, worse) = house.HUES[place], _ends(score)
+    right = panel.get_xlim()[1]
+    ends = [max(min(value, right), low) for value in (median, worse)]
+    panel.plot(ends, [y, y], color=hue, linewidth=1.1)
+    if math.isfinite(median):
+        panel.plot(ends[:1], [y], MARKERS[place], color=hue, markersize=3.6, clip_on=False)
+    if not math.isfinite(worse):
+        panel.plot([right], [y], ">", color=hue, markersize=4.0, clip_on=False)
+
+
+def _draw_goal(panel: Any, row: int, goal: Goal, line: Line) -> None:
+    """Draw a goal as a dotted upright, longer for the strictest statistic of the row."""
+    if goal.plain and line.bound is not None:
+        return
+    panel.plot(
+        [goal.at_most] * 2, [row - 0.45, row + 0.45], color=house.MUTE, linewidth=0.8, dashes=(1, 1)
+    )
+
+
+def _row_name(line: Line) -> str:
+    """Return what stands beside a row."""
+    fleet = "" if line.fleet == "rig" else f"{line.fleet}, "
+    bound = ""
+    if line.bound is not None:
+        measure = MEASURES[line.measure]
+        bound = f" ({line.bound * measure.factor:{measure.shown}} {measure.unit})"
+    return f"{fleet}{line.scenario}: {MEASURES[line.measure].heading}{bound}"
+
+
+def _write_head(page: Any, lines: Sequence[Line], drawn: Sequence[str], height_in: float) -> None:
+    """Write the title, and the name of every controller beside its mark."""
+    fleets = list(dict.fromkeys(line.fleet for line in lines))
+    runs = {f: max(s.runs for ln in lines if ln.fleet == f for s in ln.scores.values())
+            for f in fleets}  # fmt: skip
+    title = "; ".join(f"{runs[fleet]} × {FLEETS[fleet].text}" for fleet in fleets)
+    from matplotlib.lines import Line2D
+
+    page.text(
+        0.02, 1.0 - 0.17 / height_in, title, fontsize=9, fontweight="bold", color=house.INK,
+        va="center",
+    )  # fmt: skip
+    for place, name in enumerate(drawn):
+        y = 1.0 - (0.37 + 0.14 * place) / height_in
+        mark = Line2D(
+            [0.022, 0.045], [y, y], color=house.HUES[place], marker=MARKERS[place],
+            markevery=[0], markersize=3.6, linewidth=1.1, transform=page.transFigure,
+        )  # fmt: skip
+        page.add_artist(mark)
+        page.text(0.055, y, name, fontsize=7.5, color=house.HUES[place], va="center")
+    note = "point: median, line: to 95 % of the plants; dotted: goals; in brackets: the bound"
+    page.text(0.965, 1.0 - 0.37 / height_in, note, fontsize=7.5, color=house.MUTE, va="center",
+              ha="right")  # fmt: skip
