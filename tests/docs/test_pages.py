@@ -99,7 +99,7 @@ def misspelt(words: list[str]) -> list[str]:
             options = {each for option in command.get_params(context) for each in option.opts}
             if word.partition("=")[0] not in options:
                 wrong.append(word)
-        elif isinstance(command, click.Group) and word.isalpha():
+        elif isinstance(command, click.Group) and word.isalnum():
             known = command.get_command(context, word)
             if known is not None:
                 command, context = known, click.Context(known, parent=context)
