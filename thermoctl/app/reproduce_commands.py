@@ -17,7 +17,7 @@ from typing import Final, TypeVar
 import click
 
 from thermoctl.app.endings import EXIT_INTERRUPTED
-from thermoctl.app.options import DURATION, Commands, Parsed, positive_number
+from thermoctl.app.options import DURATION, FILE, Commands, Parsed, positive_number
 from thermoctl.app.results import (
     console,
     make_folder,
@@ -115,7 +115,8 @@ def _out_option(folder: str) -> Callable[[F], F]:
     """Return ``--out``, into `folder` unless another is given."""
     return click.option(
         "--out",
-        type=click.Path(path_type=Path),
+        type=FILE,
+        metavar="DIR",
         default=folder,
         show_default=True,
         help="Folder the figures go into.",
@@ -123,12 +124,13 @@ def _out_option(folder: str) -> Callable[[F], F]:
 
 
 def _replications_option(paper: Paper) -> Callable[[F], F]:
-    """Return ``--replications``; which count is taken without it, the study says."""
+    """Return ``--replications``; which count is taken without it, the studies say."""
+    counts = [f"{paper.study().replications:,} if not given"]
+    counts += [f"{o.study().replications:,} with {option}" for option, o in paper.others.items()]
     return click.option(
         "--replications",
         type=click.IntRange(1, MOST_REPLICATIONS),
-        show_default=f"{paper.study().replications:,}",
-        help="Independent runs to average over.",
+        help=f"Independent runs to average over; {', '.join(counts)}.",
     )
 
 
