@@ -79,6 +79,10 @@ PAPERS: Final = {
         "thermoctl.studies.papers.bicer2017:Bicer2017",
         "Follow a drug through two compartments with a wrong model, as BO17 did.",
     ),
+    "lainiotis": Paper(
+        "thermoctl.studies.papers.lainiotis:Lainiotis",
+        "Tell order and delay from samples, with the filter bank of ALF.",
+    ),
 }
 """Studies by the name of their command."""
 

@@ -168,7 +168,7 @@ def _parameter_tables(result: Replay, spell: Spelling) -> tuple[Table, Table]:
 
 
 def print_table(console: Console, table: Table, otherwise: Table | None = None) -> None:
-    """Print a table after an empty line, whole; the narrower one where the terminal is narrow."""
+    """Print a table whole, or `otherwise` where only that one fits the terminal."""
     roomy = console.options.update(width=10_000)
     widths = [Measurement.get(console, roomy, each).maximum for each in (table, otherwise or table)]
     if widths[0] > console.width and widths[1] < widths[0]:
