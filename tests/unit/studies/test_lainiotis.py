@@ -155,6 +155,20 @@ def test_a_narrow_prior_knows_the_order_and_never_says_so(rows, spread):
     assert spread["AR(2), P0 = 1"]["never"] > 0.85
 
 
+@pytest.mark.slow
+def test_95_percent_ten_samples_running_are_worth_more_than_the_first():
+    case = cases()[0]
+    first, tenth = [], []
+    for replication in range(100):
+        reached = case.posteriors(generator(1, replication)) >= 0.95
+        kept = np.array([reached[t : t + 10].all(axis=0) for t in range(SAMPLES - 9)])
+        for found, above in ((first, reached), (tenth, kept)):
+            found.append(int(above[above.any(axis=1).argmax()].argmax()))
+    assert first.count(0) + first.count(case.truth) == 100  # order 1 or 2, none of them larger
+    assert first.count(0) >= 10
+    assert tenth.count(case.truth) >= 98
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [
