@@ -74,6 +74,12 @@ PAPERS: Final = {
     "ozbek2021": Paper(
         "thermoctl.studies.papers.ozbek2021:Ozbek2021",
         "Follow a parameter that jumps, with seven estimators, as O21 did.",
+        {
+            "--control": Paper(
+                "thermoctl.studies.papers.control27:Control27",
+                "Close the loop of (27) instead, over plants that change and one at rest.",
+            )
+        },
     ),
     "bicer2017": Paper(
         "thermoctl.studies.papers.bicer2017:Bicer2017",
