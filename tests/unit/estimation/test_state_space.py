@@ -46,15 +46,6 @@ def test_an_update_agrees_with_the_information_form(n, m):
         assert belief.innovation_cov == pytest.approx(model.H @ P @ model.H.T + model.R)
 
 
-def test_the_covariance_settles_at_the_riccati_fixed_point():
-    Q, R = 0.5, 2.0
-    law = StateKalman(LinearModel(np.eye(1), np.eye(1), Q, R))
-    belief = after(law, [20.0] * 100, x0=[0.0], P0=1e3)
-    predicted = (Q + math.sqrt(Q**2 + 4 * Q * R)) / 2
-    assert belief.P.item() == pytest.approx(predicted * R / (predicted + R), rel=1e-12)
-    assert belief.innovation_cov.item() == pytest.approx(predicted + R, rel=1e-12)
-
-
 def test_the_belief_does_not_depend_on_the_order_of_the_states():
     rng = np.random.default_rng(5)
     model, order = random_model(rng, 4, 2), np.array([2, 0, 3, 1])
