@@ -162,7 +162,7 @@ def finding(posteriors: Array, truth: int) -> Finding:
 
 
 @dataclass(slots=True, eq=False)
-class Record:
+class Tally:
     """What is kept of the replications of one case, in the order they came."""
 
     total: Array | float = 0.0
@@ -211,15 +211,15 @@ class Lainiotis:
 
     def run(self) -> Iterator[Outcome]:
         """Yield what is known after each batch of replications; the last is the whole."""
-        records = [(case, Record()) for case in cases()]
+        tallies = [(case, Tally()) for case in cases()]
         due = BATCH
         for replication in range(self.replications):
-            for case, record in records:
+            for case, tally in tallies:
                 rng = generator(self.seed, replication)  # anew: cases must not differ in noise
-                record.add(case.posteriors(rng), case.truth)
+                tally.add(case.posteriors(rng), case.truth)
             finished = replication + 1
             if finished in (due, self.replications):
-                yield Outcome(finished, [_row(*each) for each in records], _figures(records))
+                yield Outcome(finished, [_row(*each) for each in tallies], _figures(tallies))
                 due = finished + max(BATCH, finished // 50)
 
     def draw(self, outcome: Outcome, files: Sequence[Path]) -> list[Path]:
@@ -227,9 +227,9 @@ class Lainiotis:
         return draw_page(outcome, self.title, SPREAD, files)
 
 
-def _row(case: Case, record: Record) -> Row:
+def _row(case: Case, tally: Tally) -> Row:
     """Return the row of a case; no median where half of the runs or more never decided."""
-    found = record.findings
+    found = tally.findings
     median = float(np.median([each.samples for each in found]))
     return {
         "case": case.name,
@@ -238,21 +238,21 @@ def _row(case: Case, record: Record) -> Row:
     }
 
 
-def _figures(records: Sequence[tuple[Case, Record]]) -> dict[str, dict[str, Any]]:
+def _figures(tallies: Sequence[tuple[Case, Tally]]) -> dict[str, dict[str, Any]]:
     """Return the probabilities of every case, and how long all of them took to decide."""
-    figures = {case.name: _probabilities(case, record) for case, record in records}
-    spread = [_distribution(case, record) for case, record in records]
+    figures = {case.name: _probabilities(case, tally) for case, tally in tallies}
+    spread = [_distribution(case, tally) for case, tally in tallies]
     return {**figures, SPREAD: {"title": "samples until the truth has 95 %", "rows": spread}}
 
 
-def _probabilities(case: Case, record: Record) -> dict[str, Any]:
+def _probabilities(case: Case, tally: Tally) -> dict[str, Any]:
     """Return the mean probability of each hypothesis, and the quartiles of the true one's."""
     names = [
         case.hypothesis.format(n=each.n, m=each.m, delay=each.delay)
         for each in case.bank.candidates
     ]
-    mean = np.asarray(record.total) / len(record.true)
-    low, high = np.quantile(record.true, (0.25, 0.75), axis=0)
+    mean = np.asarray(tally.total) / len(tally.true)
+    low, high = np.quantile(tally.true, (0.25, 0.75), axis=0)
     return {
         "title": f"probability of {case.name}",
         "t": list(range(1, SAMPLES + 1)),
@@ -263,12 +263,12 @@ def _probabilities(case: Case, record: Record) -> dict[str, Any]:
     }
 
 
-def _distribution(case: Case, record: Record) -> dict[str, Any]:
+def _distribution(case: Case, tally: Tally) -> dict[str, Any]:
     """Return the samples of every run to its decision, None for never."""
-    samples = [each.samples for each in record.findings]
+    samples = [each.samples for each in tally.findings]
     return {
         "case": case.name,
         "samples": [int(each) if math.isfinite(each) else None for each in samples],
         "never": float(np.mean(np.isinf(samples))),
-        "misled": float(np.mean([each.misled for each in record.findings])),
+        "misled": float(np.mean([each.misled for each in tally.findings])),
     }
