@@ -9,7 +9,7 @@ from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
 from thermoctl.estimation import Identifier
 from thermoctl.regulator import Plan, Regulator
-from thermoctl.signals import Beliefs, Measurement, Mode, Quality, State
+from thermoctl.signals import Beliefs, ManualPower, Measurement, Mode, Quality, State
 
 HOLDING = Beliefs(holding_power=0.2)
 TABLE = {"setpoint_c": 37.5, "trip_above_c": 60.0, "mode": "auto"}
@@ -136,6 +136,15 @@ def test_a_quality_of_any_kind_is_no_exception(quality):
     subject = Regulator(plan())
     see(subject, 0)
     assert 0.0 <= subject.step(Measurement(1.0, 37.4, quality)).command.power <= 1.0
+
+
+@pytest.mark.parametrize("mode", ["manual", "auto"])
+def test_a_controller_that_cannot_even_look_costs_the_power_of_whoever_steers(mode):
+    whole = replace(plan(), mode=Mode(mode), controller=Odd(observes=RuntimeError("eyes shut")))
+    subject = Regulator(whole)
+    subject.request(ManualPower(0.4))
+    step = see(subject, 0)
+    assert (step.command.power, step.state) == (0.0, State.SAFE)
 
 
 def test_a_failure_that_lasts_is_told_once_and_not_every_second():

@@ -1,4 +1,4 @@
-"""The study of O21 (27): which estimators hold a temperature while the plant changes.
+"""The study of O21 (27): which estimators hold a plant that changes.
 
 The paper closes this loop around an aquarium and shows one run. Here the plant is the model itself,
 so that nothing but the estimator decides, and a law that knows a has no more than the noise.

@@ -1,4 +1,4 @@
-"""One page: parameter, output and input of the loop of O21 (27), and its deviations."""
+"""One page: parameter, output and input of the loop of O21 (27), and a table."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ class Scenario:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """Who tells the law of (23) what a is: an estimator, or None for one who knows a(t+1)."""
+    """Who tells the law of (23) what a is: an estimator; None: a(t+1) is known."""
 
     name: str
     law: RecursiveLaw | None
