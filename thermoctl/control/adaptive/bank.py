@@ -95,7 +95,7 @@ class Bank:
     period_s : float
         Time from one sample to the next, .05 to 3,600 s.
     u_min, u_max : float
-        Least and most power; finite, ``u_min < u_max``, 0 within.
+        Least and most power: at most 0, and above it.
 
     Raises
     ------
@@ -113,8 +113,10 @@ class Bank:
         for name in ("u_min", "u_max"):
             if not is_finite_number(getattr(self, name)):
                 raise ValueError(f"{name} must be a finite number, got {getattr(self, name)!r}")
-        if not self.u_min <= 0.0 < self.u_max:
-            raise ValueError(f"u_min must be at most 0 and u_max above, got {self.bounds}")
+        if self.u_min > 0.0:
+            raise ValueError(f"u_min must be at most 0, got {self.u_min!r}")
+        if self.u_max <= 0.0:
+            raise ValueError(f"u_max must be positive, got {self.u_max!r}")
         object.__setattr__(self, "hypotheses", Hypotheses.at_period(self.period_s))
         object.__setattr__(self, "_drift", filters.Drift(self.period_s))
 
@@ -136,7 +138,7 @@ class Bank:
         )
 
     def observe(self, belief: BankBelief, y_c: float, applied: float) -> BankBelief:
-        """Return the belief after a period of `applied` that ended with the reading `y_c`.
+        """Return the belief after a period of `applied` and the reading `y_c`.
 
         Parameters
         ----------
@@ -174,7 +176,7 @@ class Bank:
         return BankBelief(sample, blind, excitation, way, *met, ahead)
 
     def lost(self, belief: BankBelief) -> BankBelief:
-        """Return the belief after a gap in which nobody knows what was applied, if anything."""
+        """Return the belief after a gap of which the applied power is not known."""
         blind = max(belief.blind, math.ceil(BLIND_S / self.period_s)) + 1
         return replace(belief, blind=blind, gate=Gate(), path=path.at_rest(self.hypotheses))
 

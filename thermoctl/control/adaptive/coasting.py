@@ -25,7 +25,7 @@ from thermoctl.quantities import Array, clamp
 
 FASTEST_S = 3.0
 """Tc is no shorter, whatever the lag."""
-FASTEST_PERIODS = 3.0
+FASTEST_PERIODS = 1.5
 """Nor shorter than so many samples: at one sample any error of the gain would be given back whole,
 and below it the loop would be unstable."""
 

@@ -1,4 +1,4 @@
-"""The bank as a controller: what the regulator shows it, and the power it asks for.
+"""The bank as a controller: a situation goes in, the power to ask for comes out.
 
 Implements section 9 of ``docs/theory.md``.
 """
@@ -11,13 +11,15 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from thermoctl.control.adaptive.bank import Bank, BankBelief
-from thermoctl.control.adaptive.coasting import power_for
+from thermoctl.control.adaptive.coasting import Outlook, power_for
+from thermoctl.control.adaptive.filters import GAIN_MIN
 from thermoctl.control.adaptive.plant_belief import (
     PlantBelief,
     gain,
     holding_power_sd,
     plant_belief,
 )
+from thermoctl.control.lasting import Lasting
 from thermoctl.control.minimum_variance import HOLDING_SD_MAX, RIDE_MAX_S
 from thermoctl.ports import Situation
 from thermoctl.quantities import is_finite_number
@@ -27,6 +29,9 @@ CALMNESS_MIN, CALMNESS_MAX = 0.1, 10.0
 RIDE_LAGS = 3.0
 UNKNOWN_S, UNKNOWN_PERIODS = 60.0, 10.0
 """After a longer gap nobody knows what was applied: commands expire."""
+
+DOUBTFUL_GAIN = 2.0 * GAIN_MIN
+"""With less at full power, in K/s, the gain rests on its bound: 200 l at 35 W, or no heater."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,17 +46,20 @@ class AdaptiveBelief:
         Time by which the bank is behind, within half a period; ahead where negative.
     since_s, given_s : float
         Time since its last sample, and the applied power integrated over it.
+    doubt : Lasting
+        Whether power seems to warm nothing.
     """
 
     bank: BankBelief
     behind_s: float = 0.0
     since_s: float = 0.0
     given_s: float = 0.0
+    doubt: Lasting = field(default_factory=Lasting)
 
 
 @dataclass(frozen=True, slots=True)
 class Adaptive:
-    r"""A bank of corrected Kalman filters and the coasting temperature; nothing to tune.
+    r"""Learn any plant with a bank of Kalman filters; nothing has to be tuned.
 
     32 hypotheses about lag and its shape each learn water temperature, loss and gain; they are
     weighted by how well they predicted. The power cancels the error of the temperature at which
@@ -103,16 +111,19 @@ class Adaptive:
         h, interval_s = self.period_s, situation.interval_s
         behind_s, since_s = belief.behind_s + interval_s, belief.since_s + interval_s
         given_s = belief.given_s + situation.applied * interval_s
-        bank, power = belief.bank, given_s / since_s if since_s > 0.0 else situation.applied
+        bank = belief.bank
+        power = given_s / since_s if belief.since_s > 0.0 else situation.applied
         reading_c = self._sign * situation.measured_c
         if interval_s > max(UNKNOWN_S, UNKNOWN_PERIODS * h):
-            return AdaptiveBelief(self.bank.observe(self.bank.lost(bank), reading_c, 0.0))
+            bank, behind_s, power = self.bank.lost(bank), h, 0.0
         periods = math.floor(behind_s / h + 0.5)
         if periods < 1:
-            return AdaptiveBelief(bank, behind_s, since_s, given_s)
+            return AdaptiveBelief(bank, behind_s, since_s, given_s, belief.doubt)
         for _ in range(periods - 1):
             bank = self.bank.observe(bank, math.nan, power)
-        return AdaptiveBelief(self.bank.observe(bank, reading_c, power), behind_s - periods * h)
+        bank = self.bank.observe(bank, reading_c, power)
+        doubt = belief.doubt.after(_doubt(bank.outlook))
+        return AdaptiveBelief(bank, behind_s - periods * h, doubt=doubt)
 
     def decide(self, belief: AdaptiveBelief, situation: Situation) -> tuple[AdaptiveBelief, float]:
         """Return the power that lets the water come to rest at the set point."""
@@ -143,5 +154,15 @@ class Adaptive:
         return 0.0 if outlook is None else min(RIDE_LAGS * outlook.lag_s, RIDE_MAX_S)
 
     def remarks(self, belief: AdaptiveBelief) -> Mapping[str, str]:
-        """Return nothing yet."""
-        return {}
+        """Return whether power seems to warm nothing: a heater that is dead, or wired to cool."""
+        return {"controller.gain_doubtful": belief.doubt.text} if belief.doubt.stands else {}
+
+
+def _doubt(outlook: Outlook | None) -> str:
+    """Return what is doubtful of the gain, "" for nothing.
+
+    Told that power cools, the filters rest on their lower bound.
+    """
+    if outlook is None or outlook.gain > DOUBTFUL_GAIN:
+        return ""
+    return f"expected more than {DOUBTFUL_GAIN:g} K/s at full power, learnt {outlook.gain:.2g}"

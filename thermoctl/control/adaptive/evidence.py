@@ -65,7 +65,15 @@ _MEAN_PER_S = 0.02
 
 
 class Excitation(NamedTuple):
-    """How much the power moves; `share` in [0, 1] is what a sample counts as evidence."""
+    """How much the power moves, and so how much a sample proves.
+
+    Parameters
+    ----------
+    mean_power : float
+        Running mean of the power over some 50 s.
+    share : float
+        What the last sample counts as evidence, in [0, 1].
+    """
 
     mean_power: float = 0.0
     share: float = 0.0

@@ -44,7 +44,7 @@ LOSS_MIN, LOSS_MAX = 0.5, 0.95
 
 
 class Drift:
-    """Process noise at one period: ``diag((.06 b)^2, .003^2, (.0015 b)^2, (2e-4 b)^2)``."""
+    """Process noise: diag((.06 b)^2, .003^2, (.0015 b)^2, (2e-4 b)^2) in a second."""
 
     __slots__ = ("gain_min", "per_gain", "z")
 
@@ -69,7 +69,7 @@ def start(hypotheses: Hypotheses, y_c: float) -> Block:
 
 
 def restarted(block: Block, hypotheses: Hypotheses, y_c: float) -> Block:
-    """Return `block` with water and sensor as at the start; gain and loss stay as they are."""
+    """Return `block` with water and sensor as at the start, gain and loss as they are."""
     after = start(hypotheses, y_c)
     after[D:, D:] = block[D:, D:]
     return after
@@ -121,7 +121,7 @@ def inflated(block: Block, nu: float, R: float) -> Block:
 
 
 def corrected(block: Block, y_c: float, R: float) -> tuple[Block, Array, Array]:
-    """Return the block after reading `y_c`, with innovation and its variance, shape (n,)."""
+    """Return the block after reading `y_c`, the innovations and their variances."""
     S = block[Z, Z] + R
     nu = y_c - block[Z, X]
     g = block[Z] / np.sqrt(S)  # P H' / sqrt S, and beside it:
@@ -130,7 +130,7 @@ def corrected(block: Block, y_c: float, R: float) -> tuple[Block, Array, Array]:
 
 
 def project(block: Block, hypotheses: Hypotheses, u_min: float, *, loss: bool) -> None:
-    """Limit gain, and if asked for loss, of a new block to what a plant can have; in place."""
+    """Limit gain, and `loss` too, of a new block to what a plant can have; in place."""
     h = hypotheses.period_s
     beta = block[BETA, X]
     np.maximum(beta, GAIN_MIN * h, out=beta)

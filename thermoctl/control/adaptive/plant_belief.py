@@ -12,6 +12,7 @@ import numpy as np
 
 from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.filters import BETA, D, X
+from thermoctl.control.adaptive.hypotheses import LAGS
 from thermoctl.quantities import Array
 
 LAG_QUANTILES = (0.05, 0.95)
@@ -115,9 +116,15 @@ def holding_power_sd(belief: BankBelief) -> float:
 
 
 def lag_quantiles(bank: Bank, belief: BankBelief) -> tuple[float, float]:
-    """Return the lags below which the hypotheses have 5 % and 95 % of the weight."""
-    order = np.argsort(bank.hypotheses.lag_s, kind="stable")
-    weight = np.cumsum(belief.weights.share[order])
-    low, high = np.searchsorted(weight, np.array(LAG_QUANTILES) * weight[-1])
-    lags = bank.hypotheses.lag_s[order]
-    return float(lags[low]), float(lags[high])
+    """Return the lags below which 5 % and 95 % of the weight lie.
+
+    A hypothesis stands for all lags up to half-way to its neighbours, on a scale of ratios: the
+    grid cannot tell them apart.
+    """
+    weight = belief.weights.share.reshape(LAGS, -1).sum(axis=1)
+    below = np.concatenate(((0.0,), np.cumsum(weight)))
+    log_lag = np.log(bank.hypotheses.lag_s.reshape(LAGS, -1)[:, 0])
+    step = log_lag[1] - log_lag[0]
+    edges = np.append(log_lag - 0.5 * step, log_lag[-1] + 0.5 * step)
+    low, high = np.exp(np.interp(LAG_QUANTILES, below / below[-1], edges)).tolist()
+    return low, high

@@ -1,0 +1,316 @@
+"""What a bank of corrected filters keeps, whatever it is told."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thermoctl.control.adaptive.bank import BLIND_S, Bank
+from thermoctl.control.adaptive.coasting import Outlook, power_for
+from thermoctl.control.adaptive.evidence import Excitation, Gate, Noise
+from thermoctl.control.adaptive.filters import BETA, GAIN_MAX, GAIN_MIN, D, T, X, Z
+from thermoctl.control.adaptive.hypotheses import Hypotheses
+
+BANK = Bank()
+
+
+def warmed(samples=300, bank=BANK, seed=3, noise_k=0.01):
+    """Return the belief after a warm-up and some steps of power, and the last reading."""
+    rng = np.random.default_rng(seed)
+    belief, water, sensor, q, u = bank.start(), 25.0, 25.0, 0.0, 0.0
+    y = water
+    for k in range(samples):
+        belief = bank.observe(belief, y, u)
+        u = 1.0 if k % 100 < 60 else 0.3
+        q += (1.0 - math.exp(-1.0 / 14.0)) * (u - q)
+        water += 0.036 * q - 0.009
+        sensor += (1.0 - math.exp(-1.0 / 6.0)) * (water - sensor)
+        y = sensor + noise_k * rng.standard_normal()
+    return belief, y
+
+
+def content(belief):
+    """Return all numbers of a belief as one tuple of arrays and scalars."""
+    return (belief.sample, belief.blind, belief.excitation, belief.noise, belief.gate,
+            belief.outlook, *(part.tobytes() for part in (*belief.path, *belief.weights[:2],
+                                                         belief.block)))  # fmt: skip
+
+
+# -- values ---------------------------------------------------------------------------------------
+
+
+def test_a_belief_stays_what_it_was_and_can_be_carried_on_twice():
+    belief, y = warmed()
+    before = content(belief)
+    ways = [BANK.observe(belief, y + away, 0.5) for away in (0.0, 30.0, math.nan, 0.0)]
+    assert content(belief) == before
+    assert content(ways[0]) == content(ways[3])
+    assert content(ways[0]) != content(ways[1])
+
+
+def test_no_array_of_a_belief_can_be_written_to():
+    belief, _ = warmed()
+    for array in (belief.block, *belief.path, *belief.weights[:2]):
+        with pytest.raises(ValueError, match="read-only"):
+            array[..., 0] = 0.0
+
+
+def test_a_reading_that_would_spoil_the_belief_raises_and_leaves_the_belief_good():
+    belief = BANK.observe(BANK.start(), 25.0, 0.0)
+    with (
+        pytest.raises(ArithmeticError, match="expected a finite belief after 1e"),
+        np.errstate(over="ignore", invalid="ignore"),
+    ):
+        BANK.observe(belief, 1e200, 0.0)
+    assert np.isfinite(BANK.observe(belief, 25.0, 0.0).block).all()
+
+
+# -- covariances ----------------------------------------------------------------------------------
+
+
+def test_covariances_stay_symmetric_to_the_last_bit_and_positive():
+    belief, y = warmed(20)
+    rng = np.random.default_rng(0)
+    for k in range(1500):
+        y += 0.3 * rng.standard_normal() + (4.0 if k % 400 == 300 else 0.0)
+        seen = y if rng.random() < 0.9 else math.nan
+        belief = BANK.observe(belief, seen, rng.random())
+        P = belief.block[:, :4]
+        assert np.array_equal(P, P.swapaxes(0, 1))
+        if k % 25 == 0:
+            assert np.linalg.eigvalsh(P.transpose(2, 0, 1)).min() > 0.0
+    assert belief.noise.samples > 1000
+
+
+def test_a_fortnight_of_quiet_regulation_wears_nothing_out():
+    bank = Bank(period_s=60.0)
+    belief = bank.start()
+    rng = np.random.default_rng(1)
+    for _ in range(20_000):
+        belief = bank.observe(belief, 37.5 + 0.01 * rng.standard_normal(), 0.2)
+    P = belief.block[:, :4].transpose(2, 0, 1)
+    assert np.linalg.eigvalsh(P).min() > 0.0
+    assert belief.outlook.coasting_c == pytest.approx(37.5, abs=0.05)
+    assert np.abs(belief.block).max() < 100.0
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(-300.0, 2000.0) | st.just(math.nan) | st.just(math.inf),
+            st.floats(-1.0, 2.0),
+        ),
+        min_size=1,
+        max_size=60,
+    ),
+    st.sampled_from([0.05, 1.0, 30.0, 3600.0]),
+)
+def test_whatever_finite_readings_come_a_power_follows(samples, period_s):
+    bank = Bank(period_s)
+    belief = bank.start()
+    for y, applied in samples:
+        belief = bank.observe(belief, y, applied)
+        if belief.outlook is not None:
+            assert 0.0 <= power_for(belief.outlook, 37.5, 0.6, period_s, bank.bounds) <= 1.0
+            x = belief.block[:, X]
+            assert (x[BETA] >= GAIN_MIN * period_s).all()
+            assert (x[BETA] <= GAIN_MAX * period_s).all()
+    assert (belief.outlook is None) == (not any(math.isfinite(y) for y, _ in samples))
+
+
+# -- readings -------------------------------------------------------------------------------------
+
+
+def test_before_the_first_reading_only_the_heat_under_way_is_known():
+    belief = BANK.start()
+    for _ in range(50):
+        belief = BANK.observe(belief, math.nan, 1.0)
+    assert belief.sample == -1
+    assert belief.outlook is None
+    assert belief.path.heat.max() == pytest.approx(1.0, abs=1e-3)
+    assert BANK.observe(belief, 25.0, 1.0).sample == 0
+
+
+def test_one_outlier_and_a_second_change_nothing_and_the_third_moves_the_water():
+    belief, y = warmed(noise_k=0.003)
+    reached = []
+    for _ in range(3):
+        coasting_c = belief.outlook.coasting_c
+        belief = BANK.observe(belief, y - 5.0, 0.3)
+        reached.append(belief.outlook.coasting_c - coasting_c)
+    assert abs(reached[0]) < 0.05
+    assert abs(reached[1]) < 0.05
+    assert reached[2] < -4.0
+    assert belief.gate.jumped
+    assert not belief.learning
+
+
+def test_a_jump_inflates_water_and_sensor_and_leaves_gain_and_loss_known():
+    belief, y = warmed(noise_k=0.003)
+    m = belief.weights.likeliest
+    before = belief.block[..., m]
+    for _ in range(3):
+        belief = BANK.observe(belief, y - 5.0, 0.3)
+    after = belief.block[..., m]
+    assert after[T, T] > 2.0 * before[T, T]
+    assert after[BETA, BETA] == pytest.approx(before[BETA, BETA], rel=0.05)
+    assert after[BETA, X] == pytest.approx(before[BETA, X], rel=0.1)
+
+
+def test_no_evidence_is_heard_for_five_lags_after_a_jump():
+    belief, y = warmed(noise_k=0.003)
+    for _ in range(3):
+        belief = BANK.observe(belief, y - 5.0, 0.3)
+    weights, lag_s = belief.weights.log, BANK.hypotheses.lag_s[belief.weights.likeliest]
+    silent = 0
+    while np.array_equal(belief.weights.log, weights):
+        belief = BANK.observe(belief, y - 5.0, float(silent % 20 < 10))
+        silent += not belief.gate.jumped
+        assert silent < 1000
+    assert silent == pytest.approx(5.0 * lag_s, abs=12.0)
+
+
+def test_after_a_long_gap_the_water_begins_anew_and_the_gain_is_kept():
+    belief, y = warmed()
+    gain = belief.outlook.gain
+    for _ in range(int(BLIND_S) + 1):
+        belief = BANK.observe(belief, math.nan, 0.0)
+    stood = belief.block
+    belief = BANK.observe(belief, math.nan, 0.0)
+    assert np.array_equal(belief.block, stood)
+    belief = BANK.observe(belief, y - 20.0, 0.0)
+    assert belief.gate.outside == 0
+    assert belief.outlook.coasting_c == pytest.approx(y - 20.0, abs=0.3)
+    assert belief.outlook.gain == pytest.approx(gain, rel=0.1)
+
+
+def test_a_gap_nobody_knows_of_leaves_no_heat_under_way():
+    belief, y = warmed()
+    assert belief.path.heat.max() > 0.1
+    belief = BANK.observe(BANK.lost(belief), y + 3.0, 0.0)
+    assert belief.path.heat.max() == 0.0
+    assert belief.outlook.coasting_c == pytest.approx(y + 3.0, abs=0.3)
+
+
+# -- noise, excitation, gate ----------------------------------------------------------------------
+
+
+def test_noise_is_told_from_second_differences_and_not_from_warming():
+    rng = np.random.default_rng(5)
+    noise = Noise()
+    for k in range(4000):
+        noise = noise.after(25.0 + 0.04 * k + 0.02 * rng.standard_normal())
+    assert math.sqrt(noise.variance) == pytest.approx(0.02, rel=0.1)
+
+
+def test_a_noise_below_three_millikelvin_is_not_believed():
+    noise = Noise()
+    for _ in range(3000):
+        noise = noise.after(25.0)
+    assert noise.variance < 1e-6
+    assert noise.believed == 1e-5
+
+
+def test_one_wild_reading_moves_the_noise_no_more_than_three_deviations_do():
+    noise = Noise(variance=0.004, last_c=25.0, before_last_c=25.0, samples=1000)
+    assert noise.after(1e6).variance == pytest.approx(0.004 * (1.0 + 8.0 * 0.005))
+
+
+@pytest.mark.parametrize(("power", "share"), [(0.24, 0.0), (0.275, 0.5), (0.31, 1.0), (0.9, 1.0)])
+def test_power_within_the_dead_zone_proves_nothing(power, share):
+    assert Excitation(mean_power=0.2).after(power, 1.0).share == pytest.approx(share)
+
+
+def test_a_sample_without_a_reading_does_not_reset_the_count_of_outliers():
+    belief, y = warmed(noise_k=0.003)
+    belief = BANK.observe(belief, y + 5.0, 0.3)
+    belief = BANK.observe(belief, math.nan, 0.3)
+    assert belief.gate == Gate(1)
+    assert BANK.observe(belief, y, 0.3).gate.outside == 0
+
+
+def test_no_log_weight_falls_below_the_floor_and_shares_add_up_to_one():
+    belief, _ = warmed(900)
+    assert belief.weights.log.max() == 0.0
+    assert belief.weights.log.min() == -30.0
+    assert belief.weights.share.sum() == pytest.approx(1.0)
+    assert belief.weights.likeliest == belief.weights.log.argmax()
+
+
+def test_a_wrong_hypothesis_at_the_floor_comes_back_when_it_is_right():
+    belief, _ = warmed(900)
+    slow = BANK.hypotheses.lag_s > 60.0
+    weights = belief.weights._replace(
+        log=np.where(slow, 0.0, -30.0), share=slow / slow.sum(), likeliest=int(slow.argmax())
+    )
+    assert belief.outlook.lag_s < 30.0
+    misled, other = replace(belief, weights=weights), belief
+    water = sensor = float(belief.block[Z, X, belief.weights.likeliest])
+    q = 0.3
+    for k in range(120):
+        u = float(k % 40 < 20)
+        q += (1.0 - math.exp(-1.0 / 14.0)) * (u - q)
+        water += 0.036 * q - 0.009
+        sensor += (1.0 - math.exp(-1.0 / 6.0)) * (water - sensor)
+        misled, other = (BANK.observe(each, sensor, u) for each in (misled, other))
+    assert misled.outlook.lag_s < 30.0
+    assert other.outlook.lag_s < 30.0
+
+
+# -- the law --------------------------------------------------------------------------------------
+
+
+def test_heat_under_way_counts_as_if_it_had_arrived():
+    belief, _ = warmed(100)
+    heated, rested = (BANK.observe(belief, math.nan, u) for u in (1.0, 0.0))
+    h = BANK.hypotheses
+    in_heater = h.element_step * (1.0 + h.element)  # arrived in this period, and still to come
+    under_way = np.where(h.dead > 0, 1.0, in_heater)
+    expected_k = float(belief.weights.share @ (belief.block[BETA, X] * under_way))
+    assert heated.outlook.coasting_c - rested.outlook.coasting_c == pytest.approx(expected_k)
+
+
+def test_at_rest_at_the_set_point_the_power_is_the_holding_power():
+    outlook = Outlook(coasting_c=37.5, holding_power=0.2, lag_s=20.0, gain=0.036)
+    assert power_for(outlook, 37.5, 0.6, 1.0, (0.0, 1.0)) == 0.2
+
+
+@pytest.mark.parametrize(
+    ("lag_s", "calmness", "period_s", "Tc_s"),
+    [(20.0, 0.6, 1.0, 12.0), (20.0, 1.2, 1.0, 24.0), (3.0, 0.6, 1.0, 3.0), (3.0, 0.6, 10.0, 15.0)],
+)
+def test_an_error_is_to_be_removed_within_tc(lag_s, calmness, period_s, Tc_s):
+    outlook = Outlook(coasting_c=37.45, holding_power=0.2, lag_s=lag_s, gain=0.036)
+    expected = 0.2 + 0.05 / (0.036 * Tc_s)
+    assert power_for(outlook, 37.5, calmness, period_s, (0.0, 1.0)) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("period_s", {"period_s": 0.0}),
+        ("period_s", {"period_s": math.nan}),
+        ("period_s", {"period_s": True}),
+        ("u_min", {"u_min": 0.1}),
+        ("u_min", {"u_min": math.nan}),
+        ("u_max", {"u_max": 0.0}),
+        ("u_max", {"u_max": "1"}),
+    ],
+)
+def test_a_bad_argument_is_refused_by_name(name, arguments):
+    with pytest.raises(ValueError, match=f"{name} must .*got"):
+        Bank(**arguments)
+
+
+def test_hypotheses_cover_three_seconds_to_two_and_a_half_minutes_in_two_shapes():
+    h = Hypotheses.at_period(1.0)
+    assert len(h) == 32
+    assert h.lag_s.min() == pytest.approx(3.0)
+    assert h.lag_s.max() == pytest.approx(150.0)
+    assert np.unique(np.round(h.lag_s, 6)).size == 16
+    assert (h.element[0::2] < h.element[1::2]).all()
+    assert D == 2
