@@ -1,4 +1,4 @@
-"""``thermoctl compare``: controllers on the same plants, against what is possible."""
+"""``thermoctl compare``: controllers on the same plants, against computed bounds."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def known_kinds() -> tuple[str, ...]:
 
 
 def contender(text: str, table: LoopTable, *, nameplate: bool = False) -> Contender:
-    """Return the controller that `text` describes: a kind, or ``kind:option=value,...``.
+    """Return the controller of `text`: a kind, or ``kind:option=value,...``.
 
     Values are written as in TOML.
 
@@ -192,7 +192,11 @@ def compare(
     out: Path,
     as_json: bool,
 ) -> None:
-    """Compare controllers on the same simulated plants, as ratios to what is possible."""
+    """Compare controllers on the same simulated plants, as ratios to bounds.
+
+    Every controller meets the same plants, mishaps and noise, and is judged on the true temperature
+    of the water. Ctrl-C keeps what is finished.
+    """
     if quick and seeds is not None:
         raise click.UsageError("expected --quick or --seeds, got both")
     count = seeds or (_QUICK_SEEDS if quick else _SEEDS)

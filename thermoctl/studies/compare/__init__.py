@@ -1,1 +1,1 @@
-"""Controllers against each other: the same plants, the same mishaps, known bounds."""
+"""Controllers against each other: the same plants and mishaps, known bounds."""

@@ -1,4 +1,4 @@
-"""Controllers from elsewhere, tuned as their users would: for the rig as it was ordered.
+"""Controllers from elsewhere, tuned for the rig as it was ordered.
 
 simple-pid, a package with many users, with gains by the SIMC rules (S. Skogestad, Journal of
 Process Control 13 (2003) 291-309) from what is known of the nominal rig.

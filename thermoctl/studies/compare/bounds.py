@@ -24,11 +24,12 @@ _HALVINGS = 40
 
 
 def bounds(plant: Plant, scenario: Scenario, period_s: float = 1.0) -> dict[str, float | None]:
-    """Return the bounds of a scenario's measures that have one, under the measures' keys.
+    """Return the bounds of a scenario, under the keys of its measures.
 
-    ``settled_s`` and ``largest_k`` are those of the fastest approach, with steady mains and quiet
-    ice; ``deviation_k`` that of minimum variance, and ``realisable_k`` that of the best law whose
-    power stays within its limits.
+    ``settled_s`` is that of the fastest approach from rest, with steady mains and quiet ice, and
+    ``deviation_k`` that of minimum variance. Two more are no measures: ``dip_k`` is how far the
+    water falls whatever is done, and ``realisable_k`` the deviation of the best law whose power
+    stays within its limits.
 
     Parameters
     ----------
@@ -50,7 +51,7 @@ def bounds(plant: Plant, scenario: Scenario, period_s: float = 1.0) -> dict[str,
         return {"settled_s": None}
     found: dict[str, float | None] = {"settled_s": way.settled_s}
     if target_c == HELD_C and not scenario.from_cold:
-        found["largest_k"] = target_c - way.lowest_c
+        found["dip_k"] = target_c - way.lowest_c
     return found
 
 
@@ -94,7 +95,7 @@ def _regulation(plant: Plant, period_s: float) -> dict[str, float | None]:
 
 
 def realisable(linear: Linear, room: float) -> Spread:
-    """Return the least deviation whose input has a standard deviation of `room` at most.
+    """Return the least deviation with an input that strays by `room` at most.
 
     Raises
     ------

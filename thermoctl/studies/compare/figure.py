@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from thermoctl.studies import figure as house
-from thermoctl.studies.compare.goals import Goal
-from thermoctl.studies.compare.plants import FLEETS
 from thermoctl.studies.compare.score import MEASURES
 from thermoctl.studies.compare.summary import Line, Score
 
@@ -19,7 +17,9 @@ MOST_DRAWN = len(house.HUES)
 MARKERS = ("o", "s", "D", "^")
 
 _ROW_IN, _MARGIN_IN, _GAP_IN = 0.30, 0.62, 0.62
-_BESIDE = 0.17
+_NAME_IN = 0.14
+_LEFT, _BESIDE = 0.02, 0.17
+_GOAL: Any = {"color": house.MUTE, "linewidth": 0.8, "dashes": (1, 1)}
 _RATIOS, _KELVIN, _TRAVEL = "times the bound", "K", "full ranges a minute"
 
 
@@ -50,9 +50,9 @@ def draw_comparison(
     panels = _panels(lines)
     rows = [len(own) for _, own in panels]
     gaps_in = _GAP_IN * (len(rows) - 1)
-    height_in = _ROW_IN * sum(rows) + gaps_in + 2.0 * _MARGIN_IN + 0.14 * len(drawn)
+    height_in = _ROW_IN * sum(rows) + gaps_in + 2.0 * _MARGIN_IN + _NAME_IN * len(drawn)
     with house.styled(house.WIDE_IN, height_in, len(panels), 1, height_ratios=rows) as (page, axes):
-        top_in = _MARGIN_IN + 0.14 * len(drawn)
+        top_in = _MARGIN_IN + _NAME_IN * len(drawn)
         page.subplots_adjust(
             left=0.30,
             right=0.965,
@@ -72,7 +72,7 @@ def _panels(lines: Sequence[Line]) -> list[tuple[str, list[Line]]]:
     """Return the lines of each panel under its unit; only panels that have lines."""
     sorted_by: dict[str, list[Line]] = {_RATIOS: [], _KELVIN: [], _TRAVEL: []}
     for line in lines:
-        if line.bound is not None:
+        if line.in_bounds:
             sorted_by[_RATIOS].append(line)
         else:
             sorted_by[_TRAVEL if line.measure == "travel_per_min" else _KELVIN].append(line)
@@ -86,23 +86,21 @@ def _draw_panel(panel: Any, lines: Sequence[Line], drawn: Sequence[str], unit: s
         for line in lines
         for name in drawn
         if name in line.scores
-        for value in _ends(line.scores[name])
+        for value in _ends(line, line.scores[name])
         if math.isfinite(value) and value > 0.0
     ]
-    low, high = (min(figures), max(figures)) if figures else (1.0, 1.0)
-    low = min(low, *(goal.at_most for line in lines for goal in line.goals), high)
-    low, high = (0.9 if unit == _RATIOS else low / 1.3), high * 1.4
+    figures += [goal.at_most for line in lines for goal in line.goals] or [1.0]
     panel.set_xscale("log")
-    panel.set_xlim(low, high)
+    panel.set_xlim(0.9 if unit == _RATIOS else min(figures) / 1.3, 1.4 * max(figures))
     panel.set_ylim(len(lines) - 0.4, -0.6)
     for row, line in enumerate(lines):
         panel.axhline(row + 0.5, color=house.ALLOWED, linewidth=0.4, zorder=0)
         for goal in line.goals:
-            _draw_goal(panel, row, goal, line)
+            panel.plot([goal.at_most] * 2, [row - 0.45, row + 0.45], **_GOAL)
         for place, name in enumerate(drawn):
             if name in line.scores:
                 offset = _BESIDE * (place - 0.5 * (len(drawn) - 1))
-                _draw_score(panel, row + offset, line.scores[name], place, low)
+                _draw_score(panel, row + offset, _ends(line, line.scores[name]), place)
     if unit == _RATIOS:
         panel.axvline(1.0, color=house.INK, linewidth=0.8)
     panel.set_yticks(range(len(lines)), [_row_name(line) for line in lines])
@@ -120,29 +118,22 @@ def _plain_ticks(panel: Any) -> None:
     panel.xaxis.set_minor_formatter(NullFormatter())
 
 
-def _ends(score: Score) -> tuple[float, float]:
-    return score.shown["median"], score.shown["p95"]
+def _ends(line: Line, score: Score) -> tuple[float, float]:
+    """Return median and 95 %."""
+    figures = score.shown(in_bounds=line.in_bounds)
+    return figures["median"], figures["p95"]
 
 
-def _draw_score(panel: Any, y: float, score: Score, place: int, low: float) -> None:
+def _draw_score(panel: Any, y: float, pair: tuple[float, float], place: int) -> None:
     """Draw a point at the median and a line to the 95 %; what is never reached points right."""
-    hue, (median, worse) = house.HUES[place], _ends(score)
-    right = panel.get_xlim()[1]
-    ends = [max(min(value, right), low) for value in (median, worse)]
+    hue, (median, worse) = house.HUES[place], pair
+    left, right = panel.get_xlim()
+    ends = [max(min(value, right), left) for value in pair]
     panel.plot(ends, [y, y], color=hue, linewidth=1.1)
     if math.isfinite(median):
         panel.plot(ends[:1], [y], MARKERS[place], color=hue, markersize=3.6, clip_on=False)
     if not math.isfinite(worse):
         panel.plot([right], [y], ">", color=hue, markersize=4.0, clip_on=False)
-
-
-def _draw_goal(panel: Any, row: int, goal: Goal, line: Line) -> None:
-    """Draw a goal as a dotted upright, longer for the strictest statistic of the row."""
-    if goal.plain and line.bound is not None:
-        return
-    panel.plot(
-        [goal.at_most] * 2, [row - 0.45, row + 0.45], color=house.MUTE, linewidth=0.8, dashes=(1, 1)
-    )
 
 
 def _row_name(line: Line) -> str:
@@ -156,25 +147,22 @@ def _row_name(line: Line) -> str:
 
 
 def _write_head(page: Any, lines: Sequence[Line], drawn: Sequence[str], height_in: float) -> None:
-    """Write the title, and the name of every controller beside its mark."""
-    fleets = list(dict.fromkeys(line.fleet for line in lines))
-    runs = {f: max(s.runs for ln in lines if ln.fleet == f for s in ln.scores.values())
-            for f in fleets}  # fmt: skip
-    title = "; ".join(f"{runs[fleet]} × {FLEETS[fleet].text}" for fleet in fleets)
+    """Write the title, the name of every controller beside its mark, and what is drawn."""
     from matplotlib.lines import Line2D
 
-    page.text(
-        0.02, 1.0 - 0.17 / height_in, title, fontsize=9, fontweight="bold", color=house.INK,
-        va="center",
-    )  # fmt: skip
+    runs = {line.fleet: max(score.runs for score in line.scores.values()) for line in lines}
+    fleets = ", ".join(f"{count} × {fleet}" for fleet, count in runs.items())
+    title = f"Controllers on the same plants: {fleets}"
+    words: Any = {"va": "center", "color": house.INK}
+    page.text(_LEFT, 1.0 - 0.17 / height_in, title, fontsize=9, fontweight="bold", **words)
     for place, name in enumerate(drawn):
-        y = 1.0 - (0.37 + 0.14 * place) / height_in
-        mark = Line2D(
-            [0.022, 0.045], [y, y], color=house.HUES[place], marker=MARKERS[place],
-            markevery=[0], markersize=3.6, linewidth=1.1, transform=page.transFigure,
-        )  # fmt: skip
-        page.add_artist(mark)
-        page.text(0.055, y, name, fontsize=7.5, color=house.HUES[place], va="center")
-    note = "point: median, line: to 95 % of the plants; dotted: goals; in brackets: the bound"
-    page.text(0.965, 1.0 - 0.37 / height_in, note, fontsize=7.5, color=house.MUTE, va="center",
-              ha="right")  # fmt: skip
+        y, hue = 1.0 - (0.37 + _NAME_IN * place) / height_in, house.HUES[place]
+        mark: Any = {"color": hue, "marker": MARKERS[place], "markevery": [0], "markersize": 3.6}
+        ends = ([_LEFT + 0.002, _LEFT + 0.025], [y, y])
+        page.add_artist(Line2D(*ends, linewidth=1.1, transform=page.transFigure, **mark))
+        page.text(_LEFT + 0.035, y, name, fontsize=7.5, va="center", color=hue)
+    note = (
+        "point: median of the plants, line: to their 95 %, at the right edge: never;"
+        " dotted: goals; in brackets: the bound"
+    )
+    page.text(_LEFT, 0.17 / height_in, note, fontsize=7.5, va="center", color=house.MUTE)

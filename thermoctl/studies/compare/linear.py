@@ -1,4 +1,4 @@
-"""The tank near its set point as a linear plant, seen through probe and converter.
+"""The tank near its set point as a linear plant, with probe and converter.
 
 Nothing is modelled anew: the transition of the heat is differenced out of
 `thermoctl.plant.thermal.step` itself, and probe, mains and ice are linear as they stand in
@@ -20,8 +20,8 @@ from thermoctl.plant.parameters import WATER_J_PER_KG_K, TankParameters
 from thermoctl.quantities import Array
 from thermoctl.studies.compare.riccati import Linear
 
-STATES = ("element_j", "water_j", "still_j", "wall_j", "bath_j")
-"""Entries of the heat that move within an hour; masses are taken as they are."""
+WATER, STILL, BATH = 1, 2, 4
+"""Places of the state; it begins as `Temperatures` and `Heat` do: element, water, still, wall."""
 
 KELVIN_PER_V = 100.0
 _PROBE_K = 1e-3
@@ -51,22 +51,19 @@ def rest(parameters: TankParameters, target_c: float) -> Rest:
     ValueError
         When there is no such state.
     """
-    k, heat = thermal.conductances(parameters), thermal.start(parameters)
-    names = _states(heat)
-    rated_w, capacity = parameters.element.rated_w, _capacities(k, heat)
-    weight = _bulk_weight(k, len(names))
-    power = 0.0
+    k, heat, power = thermal.conductances(parameters), thermal.start(parameters), 0.0
+    n = len(_temperatures(k, heat)) + 1
     for _ in range(_TURNS):
 
         def drift(moved: Array, heat: thermal.Heat = heat, power: float = power) -> Array:
-            at = _moved(heat, names, moved[:-1] * capacity)
-            rate = thermal.rates(k, at, (power + moved[-1]) * rated_w)
-            off_k = weight @ _temperatures(at, names, capacity) - target_c
-            return np.append(_entries(rate, names) / capacity, off_k)
+            at = _moved(k, heat, moved[:-1])
+            heater_w = (power + moved[-1]) * parameters.element.rated_w
+            off_k = thermal.temperatures(k, at).bulk_c - target_c
+            return np.append(_rates(k, at, heater_w), off_k)
 
-        n = len(names) + 1
-        change = np.linalg.solve(_slope(drift, n), -drift(np.zeros(n)))
-        heat, power = _moved(heat, names, change[:-1] * capacity), power + float(change[-1])
+        residual = -drift(np.zeros(n))
+        change: Array = np.linalg.inv(_slope(drift, n)) @ residual
+        heat, power = _moved(k, heat, change[:-1]), power + float(change[-1])
         if float(np.abs(change).max()) < 1e-9:
             return Rest(heat, power)
     raise ValueError(f"expected a state of rest at {target_c:g} degC, found none")
@@ -78,9 +75,10 @@ def linear_tank(
     at: Rest,
     period_s: float = 1.0,
 ) -> Linear:
-    """Return the tank about `at`, sampled every `period_s`; input: power, outputs in K.
+    """Return the tank about `at`, sampled every `period_s`.
 
-    Measured is the mean of a burst, judged the mean temperature of the water.
+    Its input is the power, its outputs are in K: measured is the mean of a burst, judged the mean
+    temperature of the water.
 
     Parameters
     ----------
@@ -99,11 +97,10 @@ def linear_tank(
     whole_A, whole_B, whole_Q = np.eye(len(A)), np.zeros_like(B), np.zeros_like(Q)
     for _ in range(steps):
         whole_A, whole_B, whole_Q = A @ whole_A, A @ whole_B + B, A @ whole_Q @ A.T + Q
-    k = thermal.conductances(parameters)
-    n = len(_states(at.heat))
+    share = parameters.vessel.still_share
     C, z = np.zeros((1, len(A))), np.zeros((1, len(A)))
     C[0, -1] = 1.0
-    z[0, :n] = _bulk_weight(k, n)
+    z[0, WATER], z[0, STILL] = 1.0 - share, share
     return Linear(whole_A, whole_B, whole_Q, C, _reading_variance(acquisition), z)
 
 
@@ -116,15 +113,14 @@ def _reading_variance(acquisition: AcquisitionParameters) -> float:
 
 def _step(parameters: TankParameters, at: Rest, step_s: float) -> tuple[Array, Array, Array]:
     """Return transition, input and noise of one step of the tank."""
-    k, names, supply = thermal.conductances(parameters), _states(at.heat), parameters.supply
-    probe, capacity, n = parameters.probe, _capacities(k, at.heat), len(names)
+    k, supply, probe = thermal.conductances(parameters), parameters.supply, parameters.probe
+    n = len(_temperatures(k, at.heat))
 
     def heat_after(moved: Array) -> Array:
         # moved: temperatures, power, unrest of the ice
-        heat = _moved(at.heat, names, moved[:n] * capacity)
         heater_w = (at.power + moved[n]) * parameters.element.rated_w
-        after = thermal.step(k, heat, heater_w, 1.0 + moved[n + 1], step_s)
-        return _entries(after, names) / capacity
+        heat = _moved(k, at.heat, moved[:n])
+        return _temperatures(k, thermal.step(k, heat, heater_w, 1.0 + moved[n + 1], step_s))
 
     J = _slope(heat_after, n + 2)
     late, part = divmod(probe.transport_s / step_s, 1.0)
@@ -143,11 +139,10 @@ def _step(parameters: TankParameters, at: Rest, step_s: float) -> tuple[Array, A
     for place, (row, spread, correlation_s) in enumerate(wanders):
         decay = math.exp(-step_s / correlation_s)
         rows[row, row], rows[row, size + 1 + place] = decay, spread * math.sqrt(1.0 - decay**2)
-    water = names.index("water_j")
-    rows[tap, water] = 1.0
+    rows[tap, WATER] = 1.0
     for each in range(tap + 1, tap + taps):
         rows[each, each - 1] = 1.0
-    past = [rows[water], *rows[tap : tap + taps]]
+    past = [rows[WATER], *rows[tap : tap + taps]]
     rows[met] = (1.0 - part) * past[int(late)] + part * past[int(late) + 1] + rows[eddy]
     follow = -math.expm1(-step_s / probe.lag_s)
     rows[sheath] = 0.5 * follow * rows[met]
@@ -167,37 +162,34 @@ def _slope(function: Callable[[Array], Array], n: int) -> Array:
     return np.array(columns).T
 
 
-def _states(heat: thermal.Heat) -> tuple[str, ...]:
-    """Return the entries of `heat` that there are: no bath, no temperature of it."""
-    return STATES if heat.bath_kg > 0.0 else STATES[:-1]
+def _temperatures(k: thermal.Conductances, heat: thermal.Heat) -> Array:
+    """Return the temperatures that move within an hour; without a bath, none of it."""
+    every = thermal.temperatures(k, heat)
+    return np.array(every[: BATH + 1] if heat.bath_kg > 0.0 else every[:BATH])
 
 
 def _capacities(k: thermal.Conductances, heat: thermal.Heat) -> Array:
-    """Return J/K of every entry of the state."""
-    water = heat.water_kg * WATER_J_PER_KG_K
+    """Return J/K of what has these temperatures."""
+    water, bath = heat.water_kg * WATER_J_PER_KG_K, heat.bath_kg * WATER_J_PER_KG_K
     still = k.still_share * water
-    bath = heat.bath_kg * WATER_J_PER_KG_K
-    every = np.array([k.element_j_per_k, water - still, still, k.wall_j_per_k, bath])
-    return every[: len(_states(heat))]
+    every = (k.element_j_per_k, water - still, still, k.wall_j_per_k, bath)
+    return np.array(every if heat.bath_kg > 0.0 else every[:BATH])
 
 
-def _bulk_weight(k: thermal.Conductances, n: int) -> Array:
-    """Return how much each temperature counts in the mean of the water."""
-    weight = np.zeros(n)
-    weight[1:3] = 1.0 - k.still_share, k.still_share
-    return weight
+def _rates(k: thermal.Conductances, heat: thermal.Heat, heater_w: float) -> Array:
+    """Return the rates of the temperatures in K/s.
+
+    Water that goes takes its heat along, so the enthalpy of what stays falls without cooling it.
+    """
+    rate, n = thermal.rates(k, heat, heater_w), len(_temperatures(k, heat))
+    gained_kg = k.still_share * rate.water_kg
+    gained = np.array((0.0, rate.water_kg - gained_kg, gained_kg, 0.0, rate.bath_kg))[:n]
+    carried = gained * WATER_J_PER_KG_K * _temperatures(k, heat)
+    rates: Array = (np.array(rate[:n]) - carried) / _capacities(k, heat)
+    return rates
 
 
-def _entries(heat: thermal.Heat, names: tuple[str, ...]) -> Array:
-    return np.array([getattr(heat, name) for name in names])
-
-
-def _temperatures(heat: thermal.Heat, names: tuple[str, ...], capacity: Array) -> Array:
-    temperatures: Array = _entries(heat, names) / capacity
-    return temperatures
-
-
-def _moved(heat: thermal.Heat, names: tuple[str, ...], by_j: Array) -> thermal.Heat:
-    """Return `heat` with its entries moved by `by_j`."""
-    before = _entries(heat, names)
-    return heat._replace(**dict(zip(names, (before + by_j).tolist(), strict=True)))
+def _moved(k: thermal.Conductances, heat: thermal.Heat, by_k: Array) -> thermal.Heat:
+    """Return `heat` with its temperatures moved by `by_k`."""
+    entries = np.array(heat[: len(by_k)]) + by_k * _capacities(k, heat)
+    return thermal.Heat(*entries.tolist(), *heat[len(by_k) :])

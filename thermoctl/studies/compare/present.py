@@ -75,7 +75,8 @@ def print_table(console: Console, lines: Sequence[Line], controllers: Sequence[s
         finally:
             console.width = terminal
         _print(console, "")
-    _print(console, f"Median / 95 % of the plants; × is times the bound, {MISSED} misses the goal.")
+    text = f"Median / 95 % of the plants; × is times the bound, {MISSED} misses a goal"
+    _print(console, f"{text}; the verdict is on {controllers[0]}.")
 
 
 def _print(console: Console, text: str) -> None:
@@ -122,8 +123,8 @@ def _heading(controller: str) -> str:
 
 
 def unit_of(line: Line) -> str:
-    """Return the unit in which a line's figures are shown; × where there is a bound."""
-    return MEASURES[line.measure].unit if line.bound is None else "×"
+    """Return the unit in which a line's figures are shown; × is times the bound."""
+    return "×" if line.in_bounds else MEASURES[line.measure].unit
 
 
 def _bound(line: Line) -> str:
@@ -135,12 +136,9 @@ def _bound(line: Line) -> str:
 
 
 def goal_words(line: Line, goal: Goal) -> str:
-    """Return a goal in words, with its unit where it is another than the line's."""
-    ratio = line.bound is not None and not goal.plain
-    measure = MEASURES[line.measure]
-    figure = goal.at_most if ratio else goal.at_most * measure.factor
-    unit = f" {measure.unit}" if goal.plain else ""
-    return f"{STATISTICS[goal.statistic]} {figure:.3g}{unit}"
+    """Return a goal in words, in the unit of its line."""
+    factor = 1.0 if line.in_bounds else MEASURES[line.measure].factor
+    return f"{STATISTICS[goal.statistic]} {goal.at_most * factor:.3g}"
 
 
 def _cell(line: Line, score: Score | None) -> str:
@@ -148,9 +146,10 @@ def _cell(line: Line, score: Score | None) -> str:
     if score is None:
         return "–"
     measure = MEASURES[line.measure]
-    factor, shown = (measure.factor, measure.shown) if score.ratio is None else (1.0, ".2f")
+    factor, form = (1.0, ".2f") if line.in_bounds else (measure.factor, measure.shown)
+    figures = score.shown(in_bounds=line.in_bounds)
     pair = " / ".join(
-        f"{score.shown[each] * factor:{shown}}" if math.isfinite(score.shown[each]) else "never"
+        f"{figures[each] * factor:{form}}" if math.isfinite(figures[each]) else "never"
         for each in ("median", "p95")
     )
     failed = f" {score.failed} failed" if score.failed else ""

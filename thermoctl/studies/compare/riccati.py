@@ -43,16 +43,17 @@ def riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
     """
     n = len(A)
     H, G, step = Q, B @ np.linalg.solve(R, B.T), A
-    for _ in range(_DOUBLINGS):
-        W = np.linalg.inv(np.eye(n) + G @ H)
-        grown = step.T @ H @ W @ step
-        G = _symmetric(G + step @ W @ G @ step.T)
-        step = step @ W @ step
-        H = _symmetric(H + grown)
-        if not np.all(np.isfinite(H)):
-            break
-        if np.abs(grown).max() <= _CLOSE * max(np.abs(H).max(), 1e-300):
-            return H
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(_DOUBLINGS):
+            W = np.linalg.inv(np.eye(n) + G @ H)
+            grown = step.T @ H @ W @ step
+            G = _symmetric(G + step @ W @ G @ step.T)
+            step = step @ W @ step
+            H = _symmetric(H + grown)
+            if not np.all(np.isfinite(H)):
+                break
+            if np.abs(grown).max() <= _CLOSE * np.abs(H).max():
+                return H
     raise ValueError("expected a plant that can be stabilised, found no stationary solution")
 
 
@@ -65,13 +66,14 @@ def lyapunov(A: Array, Q: Array) -> Array:
         When `A` is not stable, so that the covariance grows without end.
     """
     X, step = Q, A
-    for _ in range(_DOUBLINGS):
-        grown = step @ X @ step.T
-        X, step = _symmetric(X + grown), step @ step
-        if not np.all(np.isfinite(X)):
-            break
-        if np.abs(grown).max() <= _CLOSE * max(np.abs(X).max(), 1e-300):
-            return X
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(_DOUBLINGS):
+            grown = step @ X @ step.T
+            X, step = _symmetric(X + grown), step @ step
+            if not np.all(np.isfinite(X)):
+                break
+            if np.abs(grown).max() <= _CLOSE * np.abs(X).max():
+                return X
     raise ValueError("expected a stable transition, the covariance has no end")
 
 

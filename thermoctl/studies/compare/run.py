@@ -1,4 +1,4 @@
-"""Runs every controller through every scenario on every plant, in processes, once each."""
+"""Runs every controller through every scenario on every plant, once each."""
 
 from __future__ import annotations
 
@@ -33,12 +33,14 @@ _DECISIVE = (
     "regulator",
     *(f"studies/compare/{name}.py" for name in ("baselines", "play", "score")),
 )
+"""Source that decides what comes of a run: after a change to it, it is another program."""
+
 _DECISIVE_FOR_BOUNDS = (
     "quantities.py",
     "plant",
     *(f"studies/compare/{name}.py" for name in ("bounds", "linear", "riccati", "swift")),
 )
-"""Source that decides what comes of a run; after a change to it, results are of another program."""
+"""Source that decides what the bounds are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,12 +67,12 @@ class Contender:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One run; without a contender the bounds of the runs of that scenario on that plant.
+    """One run, or the bounds of runs.
 
     Parameters
     ----------
     contender : Contender or None
-        Who controls.
+        Who controls; None: the bounds of that scenario on that plant.
     plant : Plant
         What is controlled.
     scenario : Scenario
@@ -117,7 +119,9 @@ def jobs_for(
     seeds: range,
     scenarios: Sequence[str] = (),
 ) -> list[Job]:
-    """Return every run, seed by seed, so that an interrupted comparison is one of fewer plants.
+    """Return every run, seed by seed.
+
+    So an interrupted comparison is one of fewer plants.
 
     Parameters
     ----------
@@ -160,7 +164,7 @@ def work(job: Job) -> Result:
 
 
 def finished(jobs: Sequence[Job], store: Store, processes: int) -> Iterator[tuple[Job, Result]]:
-    """Yield each job with its result as soon as it is known; those in `store` come first.
+    """Yield each job with its result; those in `store` come first.
 
     Whoever stops early keeps what is finished: results are stored before they are yielded, and
     runs that are under way are waited for and stored.

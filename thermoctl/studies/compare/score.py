@@ -12,6 +12,9 @@ from thermoctl.studies.compare.play import Trace
 BAND_K = 0.1
 """Settled means within this of the set point, for good."""
 
+STAY = 0.2
+"""For good means for the last fifth of the stretch at least."""
+
 
 @dataclass(frozen=True, slots=True)
 class Measure:
@@ -44,12 +47,15 @@ def _overshoot_k(trace: Trace) -> float:
 
 
 def _settled_s(trace: Trace) -> float | None:
-    """Return when the water was within the band for good; None: not until the end."""
+    """Return when the water came into the band for good; None: it did not.
+
+    For good is until the end, and that for a fifth of the stretch: a swing may end inside.
+    """
     outside = np.flatnonzero(np.abs(trace.true_c - trace.setpoint_c) > BAND_K)
     if not outside.size:
         return 0.0
     inside = int(outside[-1]) + 1
-    return float(trace.t_s[inside]) if inside < len(trace.t_s) else None
+    return float(trace.t_s[inside]) if inside <= (1.0 - STAY) * len(trace.t_s) else None
 
 
 def _largest_k(trace: Trace) -> float:
@@ -76,7 +82,7 @@ MEASURES: Mapping[str, Measure] = {
     "settled_s": Measure("settled after", "s", ".0f", _settled_s),
     "deviation_k": Measure("deviation", "mK", ".1f", _deviation_k, 1e3),
     "bias_k": Measure("bias", "mK", ".1f", _bias_k, 1e3),
-    "largest_k": Measure("largest", "K", ".3f", _largest_k),
+    "largest_k": Measure("farthest off", "K", ".3f", _largest_k),
     "travel_per_min": Measure("travel", "/min", ".2f", _travel_per_min),
 }
 """Every measure by its key in JSON."""

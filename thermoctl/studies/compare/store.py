@@ -1,4 +1,4 @@
-"""Results on disk: a JSON line for each finished run, so that nothing is run twice.
+"""Results on disk: a JSON line for each run, so that nothing is run twice.
 
 A line is written in one piece when its run is over. What an interrupted write has left behind is
 passed over, and the run done again.
@@ -48,7 +48,7 @@ class Result:
 
 
 class Store:
-    """The results in one file; those that are there already, and those that are added.
+    """The results in one file: those that are there, and those that are added.
 
     Parameters
     ----------

@@ -36,10 +36,9 @@ class Score:
     failed: int
     passed: bool | None
 
-    @property
-    def shown(self) -> Mapping[Statistic, float]:
-        """Statistics of the ratio, or of the measure where it has no bound."""
-        return self.plain if self.ratio is None else self.ratio
+    def shown(self, *, in_bounds: bool) -> Mapping[Statistic, float]:
+        """Return the statistics of the ratio, or those of the measure itself."""
+        return self.ratio if in_bounds and self.ratio is not None else self.plain
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +63,11 @@ class Line:
     bound: float | None
     goals: tuple[Goal, ...]
     scores: Mapping[str, Score]
+
+    @property
+    def in_bounds(self) -> bool:
+        """Whether it is shown as ratios: there is a bound, and no goal is plain."""
+        return self.bound is not None and not any(goal.plain for goal in self.goals)
 
 
 def summarise(results: Iterable[Result], controllers: Sequence[str]) -> list[Line]:

@@ -1,4 +1,4 @@
-"""The fastest way to a set point, on a tank that is known to the last coefficient.
+"""The fastest way to a set point, on a tank that is known exactly.
 
 More heat at any time makes everything hotter ever after, so the fastest law that does not leave the
 band on its far side is full power until a certain moment and none from then on: the water coasts to

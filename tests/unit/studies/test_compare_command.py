@@ -1,0 +1,118 @@
+"""``thermoctl compare`` as it is typed."""
+
+import json
+import re
+
+import pytest
+from click.testing import CliRunner
+
+from thermoctl.app.compare_command import RESULTS, compare, contender
+from thermoctl.app.plugins import BadOption
+from thermoctl.app.settings import load
+from thermoctl.app.sim import profile
+from thermoctl.control.minimum_variance import SelfTuningMinimumVariance
+from thermoctl.errors import ConfigError, Unavailable
+from thermoctl.studies.compare import baselines
+from thermoctl.studies.compare.plants import plant
+
+_, TABLE = load(profile("aquarium")).loop()
+BRIEF = ["--scenario", "warm-up", "--seeds", "1", "--jobs", "1"]
+
+
+def run(*arguments):
+    return CliRunner().invoke(compare, [str(each) for each in arguments])
+
+
+def test_options_behind_the_colon_are_those_of_the_law():
+    plan = contender("self-tuning-mv:reference_time_s=45,zero_radius=2.0", TABLE)
+    law = plan.plan_for(plant("rig", 0)).controller
+    assert isinstance(law, SelfTuningMinimumVariance)
+    assert (law.reference_time_s, law.zero_radius) == (45, 2.0)
+
+
+def test_a_kind_alone_has_the_defaults_of_its_law_not_those_of_the_profile():
+    law = contender("self-tuning-mv", TABLE).plan_for(plant("rig", 0)).controller
+    assert law.reference_time_s == 0.0
+
+
+def test_contenders_that_differ_in_an_option_have_another_identity():
+    identities = {contender(text, TABLE).identity for text in ("on-off", "on-off:hysteresis_k=1")}
+    identities.add(contender("on-off", TABLE, nameplate=True).identity)
+    assert len(identities) == 3
+    assert contender("on-off", TABLE).identity in identities
+
+
+def test_a_nameplate_tells_the_model_litres_and_watts():
+    small = plant("sizes", 1)
+    told = contender("self-tuning-mv", TABLE, nameplate=True).plan_for(small).identifier
+    tank = small.parameters
+    expected_k = tank.element.rated_w / (4186.0 * tank.vessel.volume_l)
+    assert told.structure.b_k == pytest.approx(expected_k)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("bang", "no controller is called 'bang'; known: .*on-off.*simple-pid"),
+        ("on-off:hysteresis=1", "hysteresis"),
+        ("on-off:hysteresis_k", "expected kind:option=value"),
+        ("on-off:hysteresis_k=-1", "at least 0, got -1"),
+        ("simple-pid:Kq=1", "Kq: unknown key"),
+    ],
+)
+def test_a_bad_controller_is_refused_with_what_was_expected(text, words):
+    if text.startswith("simple-pid"):
+        pytest.importorskip("simple_pid")
+    with pytest.raises(BadOption, match=words):
+        contender(text, TABLE)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--fleet", "navy"], "expected one of rig, sizes, lags, got 'navy'"),
+        (["--scenario", "flood"], "expected one of warm-up, .*half-gone, got 'flood'"),
+        (["--quick", "--seeds", "3"], "--quick or --seeds"),
+        (["--fleet", "sizes", "--scenario", "ice"], "expected a scenario of sizes"),
+    ],
+)
+def test_bad_names_are_refused_with_the_list_of_what_there_is(arguments, words, tmp_path):
+    done = run(*arguments, "--controller", "on-off", "--out", tmp_path)
+    assert done.exit_code == 2
+    assert re.search(words, " ".join(done.output.split()))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_loop_that_may_not_be_so_warm_is_refused(tmp_path):
+    text = profile("aquarium").read_text(encoding="utf-8")
+    cold = tmp_path / "cold.toml"
+    cold.write_text(text.replace("setpoint_max_c = 55.0", "setpoint_max_c = 38.0"))
+    done = run("--controller", "on-off", "-c", cold, "--out", tmp_path / "out")
+    assert isinstance(done.exception, ConfigError)
+    assert "cannot be compared" in str(done.exception)
+
+
+def test_a_baseline_that_is_not_installed_is_named(monkeypatch):
+    monkeypatch.setitem(baselines._MODULES, "simple-pid", "no_such_package")
+    with pytest.raises(Unavailable, match="simple-pid is not installed"):
+        contender("simple-pid", TABLE)
+
+
+def test_a_comparison_prints_a_table_draws_a_page_and_keeps_its_runs(tmp_path):
+    done = run("--controller", "on-off", *BRIEF, "--out", tmp_path)
+    assert done.exit_code == 0, done.output
+    assert "settled after" in done.output
+    assert "the verdict is on on-off" in done.output
+    names = {file.name for file in tmp_path.iterdir()}
+    assert names >= {RESULTS, "compare.png", "compare.svg"}
+    assert len((tmp_path / RESULTS).read_text().splitlines()) == 2
+
+
+def test_json_is_one_object_and_the_second_time_nothing_is_run(tmp_path):
+    arguments = ["--controller", "on-off", *BRIEF, "--out", tmp_path, "--json"]
+    first, second = run(*arguments), run(*arguments)
+    content = json.loads(second.stdout)
+    assert content == json.loads(first.stdout)
+    assert content["conditions"]["seeds"] == 1
+    assert [each["measure"] for each in content["lines"]] == ["overshoot_k", "settled_s"]
+    assert len((tmp_path / RESULTS).read_text().splitlines()) == 2
