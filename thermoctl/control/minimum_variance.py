@@ -236,9 +236,15 @@ def _farthest_zero(b: Array) -> float:
     """Return the largest modulus of a zero of B, b1 z^(m-1) + ... + bm; 0 when there is none."""
     if len(b) == 1 or not np.isfinite(b).all():
         return 0.0
-    if b[0] == 0.0:  # a zero at infinity
-        return math.inf if b[1:].any() else 0.0
-    return float(np.abs(np.roots(b)).max(initial=0.0))
+    if not b[1:].any():
+        return 0.0
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        monic = b / b[0]
+    if not np.isfinite(monic).all():  # b1 is 0, or next to it: a zero at infinity
+        return math.inf
+    if len(b) == 2:  # the usual order; a tenth of the time of the general case
+        return abs(float(monic[1]))
+    return float(np.abs(np.roots(monic)).max(initial=0.0))
 
 
 def _sd(P: Array, slope: Array) -> float:

@@ -87,9 +87,23 @@ def test_what_is_cancelled_is_not_remarked_on(law):
     assert law.remarks(seen(law, OUTSIDE)) == {}
 
 
-def test_a_first_input_without_effect_is_a_zero_at_infinity():
-    law = SelfTuningMinimumVariance(Arx(1, 2))
-    assert "got one at inf" in law.remarks(seen(law, [-0.95, 0.0, 0.2]))["controller.detuned"]
+@pytest.mark.parametrize("b", [(0.0, 0.2), (1e-310, 0.2), (0.0, 0.2, 0.1), (1e-310, 0.2, 0.1)])
+def test_a_first_input_next_to_without_effect_is_a_zero_at_infinity(b):
+    law = SelfTuningMinimumVariance(Arx(1, len(b)))
+    told = law.remarks(seen(law, [-0.95, *b]))
+    assert "got one at inf" in told["controller.detuned"]
+
+
+@pytest.mark.parametrize(
+    "zeros", [[-2.5], [0.0], [0.5, -1.5], [0.5 + 2.0j, 0.5 - 2.0j, 1.0], [0.0, 0.0, -1.25]]
+)
+def test_the_zero_that_is_named_is_the_farthest(zeros):
+    b = 0.2 * np.poly(zeros).real
+    law = SelfTuningMinimumVariance(Arx(1, len(b)), zero_radius=1e-3)
+    farthest = max(map(abs, zeros))
+    told = law.remarks(seen(law, [-0.95, *b]))
+    text = f"expected zeros of B within radius 0.001, got one at {farthest:.3g}"
+    assert told == ({"controller.detuned": text} if farthest else {})
 
 
 @pytest.mark.parametrize(("b", "least"), [(0.005, 0.01), (0.0, 0.01), (-0.04, 0.01), (-0.04, 0.0)])
