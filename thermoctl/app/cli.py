@@ -29,6 +29,7 @@ _COMMANDS: Final = {
     "drivers": "thermoctl.app.board_commands:drivers",
     "doctor": "thermoctl.app.board_commands:doctor",
     "simulate": "thermoctl.app.board_commands:simulate",
+    "tune": "thermoctl.app.tune_command:tune_command",
     "replay": "thermoctl.app.study_commands:replay_command",
     "reproduce": "thermoctl.app.reproduce_commands:reproduce",
     "compare": "thermoctl.app.compare_command:compare",

@@ -1,0 +1,118 @@
+"""Figure of a tuning: the run, the probabilities of orders, the answer to full power."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from thermoctl.quantities import Array
+from thermoctl.studies import figure as house
+from thermoctl.studies.excitation import Excitation
+from thermoctl.studies.orders_figure import draw_posterior
+from thermoctl.studies.replay_figure import draw_record
+from thermoctl.studies.tuning import Tuning
+from thermoctl.studies.words import number
+
+_HEIGHTS_IN = (1.6, 0.7, 1.2, 1.7)
+_TOP_IN, _BOTTOM_IN, _SPACE_IN = 0.45, 0.5, 0.62
+_LABEL_GAP = 0.09
+_LAGS_SHOWN, _LEAST_SHOWN = 4.0, 30.0
+
+
+def draw_tuning(tuning: Tuning, excitation: Excitation, paths: list[Path]) -> list[Path]:
+    """Draw `tuning` of the run of `excitation` and write it to each of `paths`.
+
+    Raises
+    ------
+    Unavailable
+        If matplotlib is not installed.
+    ValueError
+        If a suffix is neither .png nor .svg.
+    OSError
+        If a file cannot be written.
+    """
+    chosen = () if tuning.given else _HEIGHTS_IN[2:3]
+    heights = [*_HEIGHTS_IN[:2], *chosen, _HEIGHTS_IN[3]]
+    height = sum(heights) + _SPACE_IN * (len(heights) - 1) + _TOP_IN + _BOTTOM_IN
+    grid = {"gridspec_kw": {"height_ratios": heights}}
+    with house.styled(house.WIDE_IN, height, len(heights), 1, **grid) as (figure, axes):
+        figure.subplots_adjust(
+            left=0.115,
+            right=0.865,
+            top=1.0 - _TOP_IN / height,
+            bottom=_BOTTOM_IN / height,
+            hspace=_SPACE_IN * len(heights) / sum(heights),
+        )
+        panels = list(axes[:, 0])
+        _draw_run(tuning, excitation, panels[:-1])
+        _draw_answer(tuning, panels[-1])
+        for index, panel in enumerate(panels):
+            house.letter(panel, "abcd"[index])
+        figure.align_ylabels(panels)
+        return [house.save(figure, path) for path in paths]
+
+
+def _draw_run(tuning: Tuning, excitation: Excitation, panels: list[Any]) -> None:
+    """Draw temperature, power and, where orders were weighed, their probabilities."""
+    record = tuning.record
+    unit_s, unit = house.time_unit(float(record.t_s[-1]))
+    draw_record(record, panels[0], panels[1], unit_s)
+    panels[0].axhspan(
+        excitation.bottom_c, excitation.top_c, color=house.ALLOWED, alpha=0.5, linewidth=0
+    )
+    panels[0].set_ylabel("°C")
+    panels[1].set_ylabel("power")
+    house.score(
+        panels[0],
+        f"band {excitation.bottom_c:g} to {excitation.top_c:g} °C · {len(record.t_s):,} samples",
+    )
+    if not tuning.given:
+        draw_posterior(panels[2], tuning.weighing, record, unit_s)
+    for panel in panels:
+        panel.set_xlim(0.0, float(record.t_s[-1]) / unit_s)
+        panel.tick_params(labelbottom=panel is panels[-1])
+    panels[-1].set_xlabel(f"time, {unit}")
+
+
+def _draw_answer(tuning: Tuning, panel: Any) -> None:
+    """Draw how the temperature answers to full power, and the gain and lag of that answer."""
+    words = tuning.words
+    panel.set_xlabel("time after full power, s")
+    panel.set_ylabel("rise, K")
+    if words is None:
+        panel.set_yticks(())
+        panel.set_xticks(())
+        house.score(panel, "the record does not tell the answer to full power")
+        return
+    lag_s = max(words.lag_s.value, 0.0)
+    t, rise = _answer(tuning, max(_LAGS_SHOWN * lag_s, _LEAST_SHOWN * tuning.record.period_s))
+    slope = words.gain_k_per_min.value / 60.0
+    panel.plot(t, np.maximum(slope * (t - lag_s), 0.0), color=house.FOURTH, dashes=(4, 2.5))
+    panel.plot(t, rise, color=house.BELIEF)
+    panel.set_xlim(0.0, float(t[-1]))
+    ends = house.spread_out(
+        [float(rise[-1]), float(slope * (t[-1] - lag_s))], _LABEL_GAP * float(rise[-1])
+    )
+    for y, text, hue in zip(ends, ("model", "gain, lag"), (house.BELIEF, house.MUTE), strict=True):
+        house.label(panel, y, text, hue)
+    gain, lag = (
+        number(each.value, 0.25 * ((each.high or each.value) - each.low))
+        for each in (words.gain_k_per_min, words.lag_s)
+    )
+    house.score(panel, f"gain {gain} K/min · lag {lag} s")
+
+
+def _answer(tuning: Tuning, duration_s: float) -> tuple[Array, Array]:
+    """Return times in s, and the wide model's rise in K after full power from rest."""
+    wide, scaling = tuning.weighing.wide, tuning.weighing.scaling
+    n, m = wide.order.n, wide.order.m
+    count = int(duration_s / tuning.record.period_s) + 1
+    u = np.concatenate((np.zeros(m), np.full(count, 1.0 / scaling.u_scale)))
+    y = np.zeros(n + count)
+    for t in range(1, count):
+        past_y, past_u = y[n + t - n : n + t][::-1], u[t : m + t][::-1]
+        y[n + t] = wide.theta[n : n + m] @ past_u - wide.theta[:n] @ past_y  # O21 (1)
+    t_s: Array = tuning.record.period_s * np.arange(float(count))
+    return t_s, scaling.y_scale * y[n:]
