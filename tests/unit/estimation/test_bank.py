@@ -35,55 +35,6 @@ def taught(bank, samples):
     return last
 
 
-def plain_bank(candidates, samples, R, P0, Q, floor):
-    """Yield posterior, prediction and thetas, written with lists and the formulas as printed."""
-    sizes = [n + m for n, m, _ in candidates]
-    theta = [[0.0] * p for p in sizes]
-    P = [[[P0 * (i == j) for j in range(p)] for i in range(p)] for p in sizes]
-    prior, ys, us = [1.0 / len(candidates)] * len(candidates), [], []
-    for y, u in samples:
-        us.append(u)
-        weights, prediction = [], 0.0
-        for i, (n, m, d) in enumerate(candidates):
-            phi = [-ys[-j] if j <= len(ys) else 0.0 for j in range(1, n + 1)]
-            phi += [us[-j] if j <= len(us) else 0.0 for j in range(d, d + m)]
-            p = range(sizes[i])
-            P_phi = [sum(P[i][r][c] * phi[c] for c in p) for r in p]
-            S = sum(phi[r] * P_phi[r] for r in p) + R
-            expected = sum(phi[r] * theta[i][r] for r in p)
-            prediction += prior[i] * expected
-            weights.append(prior[i] * math.exp(-((y - expected) ** 2) / S / 2) / math.sqrt(S))
-            theta[i] = [theta[i][r] + P_phi[r] / S * (y - expected) for r in p]
-            P[i] = [[P[i][r][c] - P_phi[r] * P_phi[c] / S + Q * (r == c) for c in p] for r in p]
-        raised = [max(w / sum(weights), floor) for w in weights]
-        prior = [w / sum(raised) for w in raised]
-        ys.append(y)
-        yield list(prior), prediction, [list(each) for each in theta]
-
-
-@pytest.mark.parametrize("candidates", [MIXED, NESTED], ids=["mixed", "nested"])
-@pytest.mark.parametrize(("Q", "floor"), [(0.0, 1e-3), (0.02, 0.0), (0.0, 0.2)])
-def test_the_bank_agrees_with_plain_lists_to_nine_digits(candidates, Q, floor):
-    floor = min(floor, 1 / len(candidates))
-    samples = plant(60)
-    plain = [(order.n, order.m, order.delay) for order in candidates]
-    ours = banks(LainiotisBank(candidates, R=0.2, P0=9.0, Q=Q, floor=floor), samples)
-    for bank, (posterior, prediction, theta) in zip(
-        ours, plain_bank(plain, samples, 0.2, 9.0, Q, floor), strict=True
-    ):
-        np.testing.assert_allclose(bank.posterior, posterior, rtol=1e-9, atol=1e-12)
-        assert bank.prediction == pytest.approx(prediction, rel=1e-9, abs=1e-9)
-        if candidates is MIXED:
-            i = candidates.index(bank.best)
-            np.testing.assert_allclose(bank.theta, theta[i], rtol=1e-9, atol=1e-9)
-            continue
-        fused = np.zeros(6)
-        for p, order, each in zip(posterior, candidates, theta, strict=True):
-            fused[: order.n] += p * np.array(each[: order.n])
-            fused[3 : 3 + order.m] += p * np.array(each[order.n :])
-        np.testing.assert_allclose(bank.theta, fused, rtol=1e-9, atol=1e-9)
-
-
 @pytest.mark.parametrize("order", [Order(2, 1, 2), Order(1, 3, 1), Order(3, 0), Order(0, 2, 4)])
 def test_one_candidate_is_the_random_walk_filter(order):
     law, belief = RandomWalkKalman(0.01, 0.5), start(order.n + order.m, 10.0)
