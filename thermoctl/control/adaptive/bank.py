@@ -54,6 +54,8 @@ class BankBelief:
         What the readings were like.
     weights : Weights
         How likely each hypothesis is.
+    heard : float
+        What the last sample counted as evidence for or against them, in [0, 1].
     block : ndarray, shape (4, 5, n) or None
         The filters; None before the first valid reading.
     outlook : Outlook or None
@@ -67,14 +69,9 @@ class BankBelief:
     noise: Noise
     gate: Gate
     weights: Weights
+    heard: float = 0.0
     block: filters.Block | None = None
     outlook: Outlook | None = None
-
-    @property
-    def learning(self) -> bool:
-        """Whether the last sample was evidence for or against a lag."""
-        heard = self.blind == 0 and self.gate.outside == 0 and self.excitation.share > 0.0
-        return heard and self.sample >= max(EVIDENCE_FROM, self.gate.silent_until)
 
 
 class Met(NamedTuple):
@@ -83,6 +80,7 @@ class Met(NamedTuple):
     noise: Noise
     gate: Gate
     weights: Weights
+    heard: float
     block: filters.Block
 
 
@@ -165,7 +163,7 @@ class Bank:
         block = self._begun(belief, y_c)
         if blind * self.period_s <= BLIND_S:
             block = filters.predicted(block, way.heat, hypotheses.sensor_step, self._drift)
-        met = Met(belief.noise, belief.gate, belief.weights, block)
+        met = Met(belief.noise, belief.gate, belief.weights, 0.0, block)
         if seen:
             met = self._met(met, y_c, sample, excitation.share)
         ahead = outlook(met.block, way, met.weights.share, hypotheses, bounds)
@@ -190,7 +188,7 @@ class Bank:
 
     def _met(self, before: Met, y_c: float, sample: int, share: float) -> Met:
         """Return what becomes of the prediction when the reading `y_c` meets it."""
-        noise, gate, weights, block = before
+        noise, gate, weights, heard, block = before
         noise = noise.after(y_c)
         R, m = noise.believed, weights.likeliest
         nu, S_m = y_c - float(block[Z, X, m]), float(block[Z, Z, m]) + R
@@ -200,7 +198,7 @@ class Bank:
         else:
             gate = gate.within()
         if gate.outlier:
-            return Met(noise, gate, weights, block)
+            return Met(noise, gate, weights, heard, block)
         if gate.jumped:
             block = filters.inflated(block, nu, R)
         block, nus, S = filters.corrected(block, y_c, R)
@@ -208,5 +206,5 @@ class Bank:
             block, self.hypotheses, self.u_min, loss=sample * self.period_s > LOSS_FROM_S
         )
         if share > 0.0 and sample >= max(EVIDENCE_FROM, gate.silent_until):
-            weights = weights.after(share, nus, S)
-        return Met(noise, gate, weights, block)
+            weights, heard = weights.after(share, nus, S), share
+        return Met(noise, gate, weights, heard, block)

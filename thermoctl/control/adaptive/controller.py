@@ -154,7 +154,7 @@ class Adaptive:
         return 0.0 if outlook is None else min(RIDE_LAGS * outlook.lag_s, RIDE_MAX_S)
 
     def remarks(self, belief: AdaptiveBelief) -> Mapping[str, str]:
-        """Return whether power seems to warm nothing: a heater that is dead, or wired to cool."""
+        """Return whether power seems to warm nothing: no heater, or one wired to cool."""
         return {"controller.gain_doubtful": belief.doubt.text} if belief.doubt.stands else {}
 
 

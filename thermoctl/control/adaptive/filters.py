@@ -69,7 +69,7 @@ def start(hypotheses: Hypotheses, y_c: float) -> Block:
 
 
 def restarted(block: Block, hypotheses: Hypotheses, y_c: float) -> Block:
-    """Return `block` with water and sensor as at the start, gain and loss as they are."""
+    """Return `block` with water and sensor as at the start, and the rest as it is."""
     after = start(hypotheses, y_c)
     after[D:, D:] = block[D:, D:]
     return after
@@ -77,34 +77,27 @@ def restarted(block: Block, hypotheses: Hypotheses, y_c: float) -> Block:
 
 def predicted(block: Block, heat: Array, sensor_step: Array, drift: Drift) -> Block:
     """Return the block one period later: T' = T - d + beta q, z' = z + a (T - z)."""
-    water, sensor, loss, gain = block
-    after = np.empty_like(block)
-    np.multiply(gain, heat, out=after[T])
-    after[T] -= loss
-    after[T] += water
-    np.subtract(water, sensor, out=after[Z])
-    after[Z] *= sensor_step
-    after[Z] += sensor
-    after[D:] = block[D:]
-    _times_transposed(after, heat, sensor_step)
-    b = np.maximum(gain[X], drift.gain_min)
-    b *= b
+    after = block.copy()
+    _move(after, heat, sensor_step)  # F [P | x]
+    columns = after.swapaxes(0, 1)
+    _move(columns[:X], heat, sensor_step)  # F P F'
+    after[Z, T] = after[T, Z]  # the one pair whose two ways of rounding differ
+    b = np.maximum(block[BETA, X], drift.gain_min)
+    noise = drift.per_gain * (b * b)
+    noise[Z] = drift.z
     diagonal = after.reshape(20, -1)[:19:6]  # elements (0, 0), (1, 1), (2, 2), (3, 3)
-    diagonal += drift.per_gain * b
-    diagonal[Z] += drift.z
+    diagonal += noise
     return after
 
 
-def _times_transposed(after: Block, heat: Array, sensor_step: Array) -> None:
-    """Multiply the P of a new block by F' from the right, in place."""
-    water, sensor = after[:, T], after[:, Z]
+def _move(rows: Block, heat: Array, sensor_step: Array) -> None:
+    """Multiply four rows by F from the left, in place; columns of P likewise by F'."""
+    water, sensor, loss, gain = rows
     towards = water - sensor
     towards *= sensor_step
     sensor += towards
-    warmed = after[:, BETA] * heat
-    warmed -= after[:, D]
-    water += warmed
-    after[Z, T] = after[T, Z]  # the one pair whose two ways of rounding differ
+    water -= loss
+    water += gain * heat
 
 
 def inflated(block: Block, nu: float, R: float) -> Block:

@@ -86,7 +86,7 @@ def plant_belief(bank: Bank, belief: BankBelief, sign: float = 1.0) -> PlantBeli
         lag_high_s=high_s,
         coasting_c=sign * outlook.coasting_c,
         noise_sd_k=math.sqrt(belief.noise.variance),
-        learning=belief.learning,
+        learning=belief.heard > 0.0,
         jumped=belief.gate.jumped,
     )
 
