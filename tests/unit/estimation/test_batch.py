@@ -54,6 +54,26 @@ def test_the_monte_carlo_study_of_the_paper_comes_out(study, row):
     assert (run.innovation**2).mean() == pytest.approx(residual_variance, rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("law", "error"),
+    [
+        (CorrectedKalman(R2=0.01), 0.531),
+        (CorrectedKalman(R2=0.1), 0.172),
+        (CorrectedKalman(R2=0.5), 0.069),
+        (CorrectedKalman(R2=10.0), 0.468),
+        (CorrectedKalman(R2=100.0), 0.645),
+        (RandomWalkKalman(0.01), 0.084),
+        (VariableForgetting(8.0), 0.068),
+        (VariableForgetting(8.0, joint=True), 0.065),
+        (VariableForgetting(0.05), 0.416),
+    ],
+    ids=repr,
+)
+def test_what_has_to_be_chosen_decides_the_error(study, law, error):
+    theta = run_batch(law, *study).theta[:, :, 0]
+    assert ((theta - POLE[:, None]) ** 2).mean() == pytest.approx(error, rel=0.03)
+
+
 def test_joint_forgetting_follows_the_paper_s_jumps_at_least_as_well(study):
     joint = run_batch(VariableForgetting(10.0, joint=True), *study).theta[:, :, 0]
     plain = run_batch(VariableForgetting(10.0), *study).theta[:, :, 0]
