@@ -83,6 +83,18 @@ def variable(theta, P, phi, y, Sigma0, least):
     )
 
 
+def joint(theta, P, phi, y, Sigma0, least):
+    """Halve the interval of lambda until (12) and (14) hold as printed, both at once."""
+    e = y - times(turned(phi), theta)[0][0]
+    low, high = Decimal(0), ONE
+    for _ in range(180):
+        middle = (low + high) / 2
+        K, _ = gain(P, phi, middle)
+        asked = ONE - (ONE - times(turned(phi), K)[0][0]) * e * e / Sigma0
+        low, high = (middle, high) if asked > middle else (low, middle)
+    return least_squares(theta, P, phi, y, max(least, low))
+
+
 def kalman(theta, P, phi, y, R1, R2, corrected):
     e = y - times(turned(phi), theta)[0][0]
     K, S = gain(P, phi, R2)
@@ -123,6 +135,7 @@ def main():
         laws = {
             "rls": lambda *a: least_squares(*a, Decimal("0.9375")),
             "vff": lambda *a: variable(*a, Decimal(5), Decimal("0.25")),
+            "joint": lambda *a: joint(*a, Decimal(5), Decimal("0.25")),
             "nkf": lambda *a, R1=R1: kalman(*a, R1, Decimal("0.375"), False),
             "ckf": lambda *a, R1=R1: kalman(*a, R1, Decimal("0.375"), True),
         }

@@ -111,7 +111,7 @@ def bounded(name: str, value: npt.ArrayLike) -> Array:
 
 
 def scalar(name: str, value: float | npt.ArrayLike) -> float:
-    """Return `value` as a plain float, NaN included; ``ValueError`` when it is no number."""
+    """Return `value` as a plain float; ``ValueError`` when it is no number."""
     if isinstance(value, float):
         return float(value)  # also of numpy's own, which would warn where a plain one overflows
     try:

@@ -34,6 +34,7 @@ def recursive_law(case):
     return {
         "rls": RecursiveLeastSquares(0.9375),
         "vff": VariableForgetting(5.0, 0.25),
+        "joint": VariableForgetting(5.0, 0.25, joint=True),
         "nkf": RandomWalkKalman(R1, 0.375),
         "ckf": CorrectedKalman(R1, 0.375),
     }[case["law"]]

@@ -105,13 +105,14 @@ def test_a_robust_noise_variance_rescues_a_filter_told_a_hundredfold_wrong_one(R
     assert np.mean(square) < 0.11
 
 
-def test_a_robust_noise_variance_of_normal_noise_is_a_tenth_above_its_variance():
+@pytest.mark.parametrize(("n", "excess"), [(1, 1.1), (4, 1.25)])
+def test_a_robust_noise_variance_is_the_variance_and_what_theta_adds_to_it(n, excess):
     rng, law, found = np.random.default_rng(5), Guarded(RandomWalkKalman(), robust_R2=True), []
-    belief = start(1)
+    belief = start(n)
     for _ in range(3000):
-        belief = law.update(belief, rng.normal(size=1), 2.0 * rng.normal())
+        belief = law.update(belief, rng.normal(size=n), 2.0 * rng.normal())
         found.append(belief.R2)
-    assert np.mean(found[100:]) == pytest.approx(1.1 * 4.0, rel=0.1)
+    assert np.mean(found[100:]) == pytest.approx(4.0 * excess, rel=0.07)
 
 
 def test_a_robust_noise_variance_of_constant_readings_stays_above_zero():
