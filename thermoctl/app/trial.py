@@ -218,7 +218,7 @@ class Trial:
 
     def _keep(self, t_s: float, power: float, temperature_c: float) -> None:
         """Put the sample into the record, or count it as one that is not known."""
-        where = f"at {t_s - self._begun_s:g} s"
+        where = f"the cycle at {t_s - self._begun_s:g} s"
         if not math.isfinite(temperature_c):
             self.record.skip(where, "temperature_c is not known")
         elif not math.isfinite(power):
