@@ -151,7 +151,7 @@ def _name(what: str, known: Sequence[str]) -> Parsed:
     multiple=True,
     default=("rig",),
     show_default=True,
-    help="Plants to run on: " + "; ".join(f"{name}, {each.text}" for name, each in FLEETS.items()),
+    help="Once for each: " + "; ".join(f"{name} ({each.text})" for name, each in FLEETS.items()),
 )
 @click.option(
     "--scenario",
@@ -261,7 +261,8 @@ def _played(planned: Sequence[Job], store: Store, processes: int) -> list[Result
             results.append(result)
     except KeyboardInterrupt as interrupt:
         kept = sum(job.key in store for job in planned)
-        say([f"{kept} of {len(planned)} runs are in {store.path}; the same command goes on there"])
+        text = f"{kept} of {len(planned)} runs are in {store.path}"
+        say([f"{text}; the same command goes on from there"])
         raise click.Abort from interrupt
     return results
 

@@ -16,7 +16,7 @@ from thermoctl.studies.compare.baselines import SimplePid, simc
 from thermoctl.studies.compare.plants import FLEETS, FleetError, plant
 from thermoctl.studies.compare.play import play
 from thermoctl.studies.compare.run import BOUND, Contender, Job, finished, jobs_for
-from thermoctl.studies.compare.scenarios import SCENARIOS
+from thermoctl.studies.compare.scenarios import SCENARIOS, SETPOINT, Happening, Scenario
 from thermoctl.studies.compare.store import Result, Store, StoreError
 
 _, TABLE = load(profile("aquarium")).loop()
@@ -118,6 +118,11 @@ def test_the_stirrer_stands_before_it_is_back():
     assert trace.true_c[-1] > 37.4
 
 
+def test_what_happens_long_before_does_not_cut_the_time_to_settle():
+    early = Scenario("early", 5.0, (Happening(-1300.0, SETPOINT, 2.5),))
+    assert play(PLAN, plant("rig", 0), early).true_c == pytest.approx(np.full(6, 40.0), abs=0.1)
+
+
 def test_a_law_that_fails_is_told_of():
     class Broken(OnOff):
         def decide(self, belief, situation):
@@ -212,7 +217,13 @@ def test_lines_that_are_no_results_are_passed_over(tmp_path):
     path = tmp_path / "r.jsonl"
     good = {"key": "k", "controller": "c", "fleet": "rig", "scenario": "step", "seed": 1,
             "measures": {"settled_s": 1.0}, "failure": None}  # fmt: skip
-    bad = [{**good, "seed": "1"}, {**good, "measures": {"settled_s": "soon"}}, {"key": "k"}, 3]
+    bad = [
+        {**good, "seed": "1"},
+        {**good, "measures": {"settled_s": "soon"}},
+        {**good, "measures": {"settled_s": float("nan")}},
+        {"key": "k"},
+        3,
+    ]
     path.write_text("\n".join(json.dumps(each) for each in [good, *bad]) + "\n")
     store = Store(path)
     assert (len(store), store.passed_over) == (1, len(bad))
