@@ -24,7 +24,7 @@ from thermoctl.app.tables import LoopTable, Options
 from thermoctl.errors import ConfigError, Refused, Unavailable
 from thermoctl.regulator import Plan
 from thermoctl.studies.compare.baselines import BASELINES, require
-from thermoctl.studies.compare.figure import draw_comparison
+from thermoctl.studies.compare.figure import MOST_DRAWN, draw_comparison
 from thermoctl.studies.compare.plants import FLEETS, Plant, plant
 from thermoctl.studies.compare.present import as_json as lines_as_json
 from thermoctl.studies.compare.present import print_table
@@ -272,5 +272,7 @@ def _draw(lines: Sequence[Line], names: Sequence[str], out: Path) -> None:
     files = [out / f"{FIGURE}{kind}" for kind in FORMATS]
     try:
         write_figures(files, lambda: draw_comparison(lines, names, files))
+        if len(names) > MOST_DRAWN:
+            say([f"the figure shows {MOST_DRAWN} of {len(names)} controllers, the table all"])
     except Unavailable as missing:
         say([str(missing)])

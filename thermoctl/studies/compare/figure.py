@@ -91,7 +91,8 @@ def _draw_panel(panel: Any, lines: Sequence[Line], drawn: Sequence[str], unit: s
     ]
     figures += [goal.at_most for line in lines for goal in line.goals] or [1.0]
     panel.set_xscale("log")
-    panel.set_xlim(0.9 if unit == _RATIOS else min(figures) / 1.3, 1.4 * max(figures))
+    low = min(0.9, min(figures)) if unit == _RATIOS else min(figures) / 1.3
+    panel.set_xlim(low, 1.4 * max(figures))
     panel.set_ylim(len(lines) - 0.4, -0.6)
     for row, line in enumerate(lines):
         panel.axhline(row + 0.5, color=house.ALLOWED, linewidth=0.4, zorder=0)
