@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from thermoctl.estimation.belief import frozen, positive, start, truth
+from thermoctl.estimation.belief import LARGEST, frozen, positive, truth
 from thermoctl.estimation.kalman import CorrectedKalman, RandomWalkKalman
 from thermoctl.estimation.least_squares import RecursiveLeastSquares
 from thermoctl.estimation.recursion import RecursiveLaw
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, clamp
 from thermoctl.signals import Estimate
 
 EXCITATION_MEMORY = 50
@@ -158,14 +158,14 @@ class Guarded:
         middle = len(memory.residuals) // 2
         sd = NORMAL_SD * float(np.partition(memory.residuals, middle)[middle])
         least = R2_FLOOR * law.R2 if self.R2_min is None else self.R2_min
-        return replace(law, R2=max(sd * sd, least))
+        return replace(law, R2=clamp(max(sd * sd, least), 1.0 / LARGEST, LARGEST))
 
     def _remembered(self, before: GuardedEstimate, phi: Array, y: float) -> _Memory:
         """Return the memory after a usable sample."""
         memory = before._memory
         if memory is None:
             scale = getattr(self.law, "R2", 1.0)  # least squares counts in units of the noise
-            parallel = start(len(before.theta), before.P / scale, before.theta)
+            parallel = Estimate(before.theta, frozen(before.P / scale))
             memory = _Memory(np.array(phi, dtype=np.float64), 0.0, parallel, np.empty(0))
         share = 1.0 / EXCITATION_MEMORY
         step = phi - memory.phi_mean

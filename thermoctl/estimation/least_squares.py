@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from thermoctl.estimation.belief import positive, truth
+from thermoctl.estimation.belief import LARGEST, positive, truth
 from thermoctl.estimation.recursion import Arithmetic, RecursiveLaw, V
 
 
@@ -94,6 +94,8 @@ class VariableForgetting(RecursiveLaw):
             S = 1.0 + q
             return S, 1.0 / arithmetic.maximum(self.forgetting_min, 1.0 - surprise / S)  # O21 (14)
         half = 0.5 * (1.0 - q - surprise)
-        root = half + (half * half + q) ** 0.5  # O21 (12) and (14) together
+        size = arithmetic.maximum(1.0 / LARGEST, abs(half) + (half * half + q) ** 0.5)
+        # half + (half**2 + q)**0.5, of which nothing would be left where half is large and negative
+        root = q / size + 2.0 * arithmetic.maximum(0.0, half)  # O21 (12) and (14) together
         forgetting = arithmetic.maximum(self.forgetting_min, root)
         return forgetting + q, 1.0 / forgetting

@@ -115,6 +115,14 @@ def test_a_robust_noise_variance_is_the_variance_and_what_theta_adds_to_it(n, ex
     assert np.mean(found[100:]) == pytest.approx(4.0 * excess, rel=0.07)
 
 
+@pytest.mark.parametrize(("R2", "y"), [(1.0, 9e24), (1e-46, 0.0), (1e-50, 0.0)])
+def test_a_robust_noise_variance_past_all_use_does_not_stop_the_loop(R2, y):
+    law, belief = Guarded(RandomWalkKalman(R2=R2), robust_R2=True), start(1)
+    for _ in range(20):
+        belief = law.update(belief, np.zeros(1), y)
+    assert belief.R2 in (pytest.approx(1e-50), pytest.approx(1e50))
+
+
 def test_a_robust_noise_variance_of_constant_readings_stays_above_zero():
     law, belief = Guarded(CorrectedKalman(R2=0.01), robust_R2=True), start(1, theta0=[1.0])
     for _ in range(100):

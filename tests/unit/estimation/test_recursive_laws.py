@@ -59,6 +59,23 @@ def test_variable_forgetting_keeps_at_least_its_minimum():
     assert belief.inflation == pytest.approx(1 / 0.4)
 
 
+@pytest.mark.parametrize(
+    ("P0", "phi", "y", "forgetting"),
+    [
+        (1e8, 1e2, 3e6, 0.1),
+        (1e8, 1e4, 1e8, 0.5),
+        (1.0, 1.0, 1e3, 1e-6),
+        (1e-8, 1.0, 1e-9, 1.0),
+        (1.0, 0.0, 2.0, 1e-12),
+        (1.0, 0.0, 1.0, 1e-12),
+        (1.0, 0.0, 0.5, 0.75),
+    ],
+)
+def test_joint_forgetting_keeps_its_digits_however_large_the_terms(P0, phi, y, forgetting):
+    belief = VariableForgetting(1.0, 1e-12, joint=True).update(start(1, P0), np.full(1, phi), y)
+    assert belief.inflation == pytest.approx(1.0 / forgetting, rel=1e-5)
+
+
 def test_joint_forgetting_satisfies_the_circular_equations_as_printed():
     Sigma0, law = 8.0, VariableForgetting(8.0, forgetting_min=1e-9, joint=True)
     phi, y = samples(3, 200, noise=1.0)
