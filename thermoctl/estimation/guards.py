@@ -146,7 +146,7 @@ class Guarded:
         """Return P with no variance above `covariance_max` and its correlations kept."""
         if self.covariance_max is None or not P.diagonal().max() > self.covariance_max:
             return P
-        d = np.sqrt(np.minimum(1.0, self.covariance_max / P.diagonal().clip(min=1e-300)))
+        d = np.sqrt(self.covariance_max / np.maximum(P.diagonal(), self.covariance_max))
         return frozen(np.multiply.outer(d, d) * P)
 
     def _law(self, memory: _Memory | None) -> RecursiveLaw:

@@ -48,6 +48,12 @@ def test_the_cap_keeps_correlations():
     assert not P.flags.writeable
 
 
+def test_the_cap_takes_variances_however_far_apart():
+    law = Guarded(RandomWalkKalman(), covariance_max=1e30)
+    P = law.update(start(2, np.diag([1e40, 1e-300])), np.zeros(2), 0.0).P
+    np.testing.assert_allclose(P, np.diag([1e30, 1e-300]), rtol=1e-12)
+
+
 def test_learning_pauses_at_rest_and_goes_on_when_the_regressor_moves():
     law, rng = Guarded(CorrectedKalman(R2=0.01), excitation_min=0.3), np.random.default_rng(2)
     belief, learned = start(2), []
