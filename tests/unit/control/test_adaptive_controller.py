@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from thermoctl.control.adaptive import Adaptive, PlantBelief
+from thermoctl.control.adaptive.bank import Bank
+from thermoctl.control.adaptive.coasting import power_for
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
 
@@ -231,3 +233,18 @@ def test_every_word_on_the_plant_has_a_meaning_of_its_own():
 def test_a_bad_setting_is_refused_by_name(name, value):
     with pytest.raises(ValueError, match=f"^{name} must .*, got"):
         Adaptive(**{name: value})
+
+
+def test_a_plant_that_is_heated_and_cooled_goes_either_way_without_overshoot():
+    bank, vessel = Bank(u_min=-0.4), Vessel()
+    belief, power, y = bank.start(), 0.0, 25.0
+    waters = []
+    for k in range(2400):
+        r = 37.5 if k < 1200 else 31.0
+        belief = bank.observe(belief, y, power)
+        power = power_for(belief.outlook, r, 0.6, 1.0, bank.bounds)
+        y = vessel.reading(power)
+        waters.append(vessel.water_c)
+    assert max(waters) < 37.6
+    assert min(waters[1200:]) > 30.9
+    assert min(waters[1500:1600]) < 31.1  # by its loss alone it would need 720 s
