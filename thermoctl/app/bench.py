@@ -17,6 +17,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -35,6 +36,9 @@ from thermoctl.services.history.schema import RunInfo
 from thermoctl.services.history.writer import HistoryWriter
 from thermoctl.services.places import make_private, state_dir
 from thermoctl.signals import Cycle, Event
+
+if TYPE_CHECKING:
+    from thermoctl.app.order_watch import OrderService
 
 HISTORY = "sim.sqlite"
 _DRAW_S = 0.05
@@ -68,8 +72,11 @@ def run_bench(settings: Settings, options: BenchOptions) -> None:
             sinks.append(stack.enter_context(_recorded(settings, options.history)))
         summary = Summary()
         sinks.append(summary.add)
+        orders = _orders_beside(settings, loop)
+        if orders is not None:
+            sinks.append(orders.step)
         if options.as_json:
-            sinks.append(_json_lines(loop, flush=math.isfinite(options.speed)))
+            sinks.append(_json_lines(loop, orders, flush=math.isfinite(options.speed)))
         else:
             view = stack.enter_context(_LiveBench.on_terminal(settings, loop, clock, options))
             sinks.append(view.take)
@@ -98,12 +105,25 @@ def _tell(summary: Summary, options: BenchOptions) -> None:
         click.echo(printable(line, utf8=look.utf8), err=True)
 
 
-def _json_lines(loop: Loop, *, flush: bool) -> Callable[[Cycle], None]:
+def _orders_beside(settings: Settings, loop: Loop) -> OrderService | None:
+    """Return what weighs orders beside the loops, where one asks for it; without a thread."""
+    if not any(table.weighs_orders for table in settings.loops.values()):
+        return None
+    from thermoctl.app.order_watch import OrderService, watches_for
+
+    def report(name: str, of: str, **fields: object) -> None:
+        loop.report(name, loop=of, **fields)
+
+    return OrderService(watches_for(settings.loops), report)
+
+
+def _json_lines(loop: Loop, orders: OrderService | None, *, flush: bool) -> Callable[[Cycle], None]:
     """Write a line a cycle; when nobody reads any more there is nothing left to run for."""
 
     def sink(cycle: Cycle) -> None:
         try:
-            sys.stdout.write(as_line(cycle) + "\n")
+            beside = {} if orders is None else orders.keys(cycle.loop)
+            sys.stdout.write(as_line(cycle, beside) + "\n")
             if flush:
                 sys.stdout.flush()
         except BrokenPipeError:

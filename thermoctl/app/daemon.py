@@ -12,9 +12,10 @@ import os
 import signal
 import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from thermoctl import __version__
 from thermoctl.app.compose import loop_for
@@ -31,6 +32,9 @@ from thermoctl.services.notify import Notifier, watchdog_interval_s
 from thermoctl.services.places import make_private, runtime_dir, state_dir
 from thermoctl.services.store import LatchStore
 from thermoctl.signals import Acknowledge, Cycle, Event, SetPoint
+
+if TYPE_CHECKING:
+    from thermoctl.app.order_watch import OrderService
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 _TURN_S = 0.2
@@ -107,6 +111,7 @@ class Daemon:
         self._keeper = LatchKeeper(
             self._latches, self._acknowledged_on_disk, report=self._journal.emit
         )
+        self._orders = _order_service(settings, self._emit)
         self._off = self._failed = self._ready = False
         self._unreached: list[str] = []
         self._ending = self._reloading = False
@@ -129,6 +134,9 @@ class Daemon:
             if self._history is not None:
                 self._history.start()
                 stack.callback(self._history.close)
+            if self._orders is not None:
+                self._orders.start()
+                stack.callback(self._orders.close)
             self._emit("loop.started", None, loops=list(self._settings.loops), version=__version__)
             gc.freeze()  # what is loaded now stays: no collection needs to look at it again
             control = threading.Thread(target=self._control, name="control", daemon=True)
@@ -207,6 +215,8 @@ class Daemon:
             self._journal.emit(event, cycle.loop)
         if self._history is not None:
             self._history.publish(cycle)
+        if self._orders is not None:
+            self._orders.publish(cycle)
 
     def _completed(self) -> None:
         """Tell the service manager: ready after the first cycle, alive after every one."""
@@ -246,6 +256,15 @@ class Daemon:
         self._journal.emit(event, loop)
         if self._history is not None:
             self._history.publish_event(event, loop)
+
+
+def _order_service(settings: Settings, emit: Callable[..., None]) -> OrderService | None:
+    """Return what weighs orders beside the loops; None, and nothing loaded, where none does."""
+    if not any(table.weighs_orders for table in settings.loops.values()):
+        return None
+    from thermoctl.app.order_watch import OrderService, watches_for
+
+    return OrderService(watches_for(settings.loops), emit)
 
 
 def _require_patient_watchdog(settings: Settings) -> None:

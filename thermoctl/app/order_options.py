@@ -1,4 +1,4 @@
-"""What ``replay`` and ``tune`` have in common on the command line: which orders to weigh."""
+"""Which orders to weigh: what ``replay`` and ``tune`` have in common."""
 
 from __future__ import annotations
 

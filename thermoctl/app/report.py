@@ -6,6 +6,7 @@ import json
 import math
 import time
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from thermoctl.app.live import numbers
@@ -21,9 +22,9 @@ def finite(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else value
 
 
-def as_line(cycle: Cycle) -> str:
-    """Return the cycle as one JSON object; the keys are words with units."""
-    return json.dumps(cycle_record(cycle), allow_nan=False)
+def as_line(cycle: Cycle, beside: Mapping[str, Any] = MappingProxyType({})) -> str:
+    """Return the cycle, and keys found beside it, as one JSON object."""
+    return json.dumps({**cycle_record(cycle), **beside}, allow_nan=False)
 
 
 def cycle_record(cycle: Cycle) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from thermoctl.estimation import LainiotisBank, Order
 from thermoctl.signals import Mode
 
 Celsius = Annotated[float, Field(ge=-273.15, le=2000.0, allow_inf_nan=False)]
@@ -143,6 +144,27 @@ class ModelTable(Table):
         return self
 
 
+class OrdersTable(Table):
+    """Table ``[loops.NAME.orders]``: orders weighed beside the loop."""
+
+    enabled: bool = Field(True, description="Weigh them; false: as if the table were not there.")
+    candidates: tuple[tuple[int, int, int], ...] | None = Field(
+        None,
+        max_length=200,
+        description="Past temperatures, powers and delay of each; the 72 of "
+        "`replay --order auto` when absent.",
+    )
+
+    @field_validator("candidates")
+    @classmethod
+    def _candidates_differ(
+        cls, value: tuple[tuple[int, int, int], ...] | None
+    ) -> tuple[tuple[int, int, int], ...] | None:
+        if value is not None:
+            LainiotisBank([Order(*each) for each in value], floor=0.0)
+        return value
+
+
 class LoopTable(Table):
     """Table ``[loops.NAME]``: what is held, how often, and within which limits."""
 
@@ -182,6 +204,10 @@ class LoopTable(Table):
         )
     )
 
+    orders: OrdersTable | None = Field(
+        None, description="Table of the orders that are weighed beside the loop; none when absent."
+    )
+
     @field_validator("controller", mode="before")
     @classmethod
     def _a_kind_alone_is_a_controller(cls, value: Any) -> Any:
@@ -206,6 +232,11 @@ class LoopTable(Table):
                 f"below trip_above_c {self.trip_above_c:g}"
             )
         return self
+
+    @property
+    def weighs_orders(self) -> bool:
+        """Whether orders are weighed beside this loop."""
+        return self.orders is not None and self.orders.enabled
 
     @property
     def setpoint_range_c(self) -> tuple[float, float]:

@@ -1,7 +1,7 @@
-"""Runs one loop through a test signal: in mode manual, with its supervisor in force.
+"""Runs one loop through a test signal, with its supervisor in force.
 
-The signal asks as an operator would, through the queue of requests; what it asks for is bounded,
-rated and refused like any other power. However it ends, power 0 is written last.
+In mode manual the signal asks as an operator would, through the queue of requests; what it asks for
+is bounded, rated and refused like any other power. However it ends, power 0 is written last.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def plan(
 
 
 def alone(settings: Settings, name: str) -> Settings:
-    """Return `settings` with nothing but the loop `name`, in mode manual, and its boards."""
+    """Return `settings` with the loop `name` only, in mode manual, and its boards."""
     table = settings.loop(name)[1]
     used = {part.board for part in (table.sensor, table.actuator) if part is not None}
     boards = {board: each for board, each in settings.boards.items() if board in used}

@@ -114,7 +114,7 @@ class Report:
         return suggestion_text(self.loop, keys, self.tuning)
 
     def write(self, folder: Path) -> list[Path]:
-        """Write text, JSON, run and, with matplotlib, the figure; return what was written."""
+        """Write text, JSON, run and figure; return what was written."""
         (folder / TEXT).write_text("\n".join(self.lines()) + "\n", encoding="utf-8")
         content = json.dumps(self.as_json(folder), allow_nan=False, ensure_ascii=False, indent=1)
         (folder / JSON).write_text(content + "\n", encoding="utf-8")

@@ -50,7 +50,7 @@ def run_on_board(
     state: Path | None,
     consent: Callable[[], None],
 ) -> Ran:
-    """Run the loop `name` on its board, once nobody else holds it and `consent` returns.
+    """Run the loop `name` on its board, once it is free and `consent` returns.
 
     Raises
     ------

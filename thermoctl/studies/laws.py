@@ -128,7 +128,7 @@ def parse_order_or_auto(text: str) -> Arx | None:
 
 
 def parse_candidates(text: str) -> tuple[Order, ...]:
-    """Return the orders `text` names: ``n,m,delay``, each a number or a range ``1-3``.
+    """Return the orders `text` names: ``n,m,delay``, each a number or a range.
 
     Raises
     ------

@@ -42,7 +42,10 @@ _SIGMAS = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Bounded:
-    """A quantity with the bounds it lies between in 95 of 100 cases; None: no upper one."""
+    """A quantity with the bounds it lies between in 95 of 100 cases.
+
+    `high` is None where there is no upper one.
+    """
 
     value: float
     low: float
@@ -79,7 +82,7 @@ class PlantWords:
 
 
 def plant_words(record: Record, setpoint_c: float, reach: int = REACH) -> PlantWords | None:
-    """Return what a model of `reach` past inputs says of the plant, None where that is no tank.
+    """Return what a wide model says of the plant, None where that is no tank.
 
     None, too, where the input moves too little for it to say anything: the bounds of the gain
     would hold 0.

@@ -1,4 +1,4 @@
-"""A record in the variables that laws see: centred, scaled, and never across a gap."""
+"""A record in the variables that laws see, never across a gap."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Scaled:
 
     @classmethod
     def of(cls, record: Record, y: Array, u: Array, order: Arx, reach: int = 1) -> Scaled:
-        """Keep the samples with at least `reach` others, and a whole regressor, before them."""
+        """Keep the samples with a whole regressor, and `reach` others, before them."""
         past = np.arange(len(y)) - record.stretch_start
         reach = max(reach, order.y_memory, order.u_memory)
         return cls(y, u, order, np.flatnonzero(past >= reach))

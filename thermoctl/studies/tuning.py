@@ -1,4 +1,4 @@
-"""What a run through a test signal teaches: order, parameters, and a plant in words."""
+"""What a run through a test signal teaches: order, parameters, plant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figure of a tuning: the run, the probabilities of orders, the answer to full power."""
+"""Figure of a tuning: the run, the orders, the answer to full power."""
 
 from __future__ import annotations
 
