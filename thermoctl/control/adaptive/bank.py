@@ -116,7 +116,7 @@ class Bank:
         if self.u_max <= 0.0:
             raise ValueError(f"u_max must be positive, got {self.u_max!r}")
         object.__setattr__(self, "hypotheses", Hypotheses.at_period(self.period_s))
-        object.__setattr__(self, "_drift", filters.Drift(self.period_s))
+        object.__setattr__(self, "_drift", filters.drift(self.period_s))
 
     @property
     def bounds(self) -> tuple[float, float]:

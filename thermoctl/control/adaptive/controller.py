@@ -31,7 +31,7 @@ UNKNOWN_S, UNKNOWN_PERIODS = 60.0, 10.0
 """After a longer gap nobody knows what was applied: commands expire."""
 
 DOUBTFUL_GAIN = 2.0 * GAIN_MIN
-"""With less at full power, in K/s, the gain rests on its bound: 200 l at 35 W, or no heater."""
+"""With less at full power, in K/s, the gain rests on its bound: 200 l at 33 W, or no heater."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +63,7 @@ class Adaptive:
 
     32 hypotheses about lag and its shape each learn water temperature, loss and gain; they are
     weighted by how well they predicted. The power cancels the error of the temperature at which
-    the water would come to rest, within :math:`T_c = \max(3\,\mathrm{s}, 3h, \kappa L)`.
+    the water would come to rest, within :math:`T_c = \max(3\,\mathrm{s}, 1.5\,h, \kappa L)`.
 
     Parameters
     ----------

@@ -152,18 +152,18 @@ class Weights(NamedTuple):
 
     def after(self, e: float, nu: Array, S: Array) -> Weights:
         """Return the weights after innovations `nu` of variances `S`, counted as `e`."""
-        cost = nu * nu
-        cost /= S
-        np.minimum(cost, SURPRISE_MAX, out=cost)
-        cost += np.log(S)
-        cost *= -0.5 * e
-        cost += self.log  # ALF (6)-(7), in logarithms
-        likeliest = int(cost.argmax())
-        cost -= cost[likeliest]
-        np.maximum(cost, FLOOR, out=cost)
-        share = np.exp(cost)
+        log = nu * nu
+        log /= S
+        np.minimum(log, SURPRISE_MAX, out=log)
+        log += np.log(S)
+        log *= -0.5 * e
+        log += self.log  # ALF (6)-(7), in logarithms
+        likeliest = int(log.argmax())
+        log -= log[likeliest]
+        np.maximum(log, FLOOR, out=log)
+        share = np.exp(log)
         share /= share.sum()
-        return Weights(cost, share, likeliest)
+        return Weights(log, share, likeliest)
 
 
 def equal(hypotheses: Hypotheses) -> Weights:

@@ -12,6 +12,8 @@ Implements section 9 of ``docs/theory.md``.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from thermoctl.control.adaptive.hypotheses import Hypotheses
@@ -38,23 +40,40 @@ DRIFT_GAIN_MIN = 1e-4
 """The shares are of no smaller gain than this, in K/s."""
 
 GAIN_MIN, GAIN_MAX = 2e-5, 0.5
-"""What a heater can do to water, in K/s: 20 W in 200 l, 1,500 W in .7 l."""
+"""What a heater can do to water, in K/s: 17 W in 200 l, 1,500 W in .7 l."""
 LOSS_MIN, LOSS_MAX = 0.5, 0.95
 """The loss keeps this far below the least and within this share of full power, in gains."""
 
 
-class Drift:
-    """Process noise: diag((.06 b)^2, .003^2, (.0015 b)^2, (2e-4 b)^2) in a second."""
+class Drift(NamedTuple):
+    """Process noise of a period, as `drift` makes it.
 
-    __slots__ = ("gain_min", "per_gain", "z")
+    Parameters
+    ----------
+    per_gain : ndarray, shape (4, 1)
+        Variances of the states over the square of the gain in K per period.
+    z : float
+        Variance of z.
+    gain_min : float
+        Least gain that is taken, in K per period.
+    """
 
-    def __init__(self, period_s: float) -> None:
-        # Per second the noises are variances and grow with the period; the gain of a period is h
-        # times that of a second, and so is the unit of d and beta.
-        in_units = np.array([DRIFT_T / period_s, 0.0, DRIFT_D, DRIFT_BETA])
-        self.per_gain = (in_units**2 * period_s)[:, None]
-        self.z = DRIFT_Z_K**2 * period_s
-        self.gain_min = DRIFT_GAIN_MIN * period_s
+    per_gain: Array
+    z: float
+    gain_min: float
+
+
+def drift(period_s: float) -> Drift:
+    """Return diag((.06 b)^2, .003^2, (.0015 b)^2, (2e-4 b)^2) times the period.
+
+    The gain of a period, and the unit of d and beta, are h times those of a second.
+    """
+    shares = np.array([DRIFT_T / period_s, 0.0, DRIFT_D, DRIFT_BETA])
+    return Drift(
+        per_gain=(shares**2 * period_s)[:, None],
+        z=DRIFT_Z_K**2 * period_s,
+        gain_min=DRIFT_GAIN_MIN * period_s,
+    )
 
 
 def start(hypotheses: Hypotheses, y_c: float) -> Block:
