@@ -135,17 +135,16 @@ def tune_command(**options: Any) -> int:
             "expected --yes, or a terminal to ask on, before a board heats",
             click.get_current_context(),
         )
-    make_folder(asked.out)
     if asked.sim:
+        make_folder(asked.out)
         ran = run_simulated(settings, name, excitation)
     else:
-        ran = run_on_board(
-            settings,
-            name,
-            excitation,
-            asked.state,
-            lambda: _consent(settings, name, excitation, asked),
-        )
+
+        def consent() -> None:
+            _consent(settings, name, excitation, asked)
+            make_folder(asked.out)
+
+        ran = run_on_board(settings, name, excitation, asked.state, consent)
     report = _learnt(settings, name, excitation, asked, ran)
     _tell(report, asked)
     return _code(ran[0])

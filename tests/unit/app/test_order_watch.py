@@ -80,7 +80,12 @@ def test_power_at_its_bounds_counts_whoever_asked_for_it():
 
 def test_a_power_that_rests_finds_nothing():
     assert not watched(cycles(levels=(0.5,)))[1]
-    assert not watched(cycles(b=0.0))[1]
+
+
+def test_nothing_is_weighed_before_the_input_was_heard():
+    watch, found = watched(cycles(b=0.0, samples=2500))
+    assert not found
+    assert watch._bank is None
 
 
 def test_cycles_without_a_reading_or_a_known_power_are_a_gap():

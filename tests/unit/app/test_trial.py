@@ -15,7 +15,7 @@ from thermoctl.model.sensor import LM335, Sensor
 from thermoctl.runtime.clock import SimulatedClock
 from thermoctl.runtime.connection import Connection
 from thermoctl.runtime.loop import Loop, Wiring
-from thermoctl.signals import Alarm, Mode, State
+from thermoctl.signals import Alarm, Mode, RawSample, State
 from thermoctl.testing import ManualClock, ScriptedBoard
 
 COLD, WARM, HOT, OPEN = 600.0, 634.0, 690.0, 1023.0
@@ -175,6 +175,28 @@ def test_a_missing_reading_asks_for_low_power():
     assert 0.1 in powers
     assert set(powers) == {0.0, 0.1, 0.8}
     assert trial.record.finish().skipped == 1
+
+
+def test_a_stale_reading_is_no_sample():
+    stale = {"temperature": RawSample(-60.0, COLD, 1024.0)}
+    trial, _ = on_script([COLD] * 50 + [stale] + [COLD] * 400, duration_s=300.0)
+    trial.run()
+    record = trial.record.finish()
+    assert record.skipped == 1
+    assert 50.0 not in record.t_s
+
+
+def test_a_run_whose_cycles_nobody_publishes_ends_in_time():
+    clock = ManualClock()
+    settings = alone(bench_settings(), "tank")
+    trial = Trial(
+        "tank",
+        plan(settings, "tank", None, 2.0, 300.0),
+        lambda publish: loop_for(settings, clock, lambda cycle: None, beside=False),
+        clock,
+    )
+    assert trial.run().ending is Ending.FINISHED
+    assert 300.0 < clock.now_s() < 320.0
 
 
 def test_the_rate_limit_of_the_supervisor_is_in_force():

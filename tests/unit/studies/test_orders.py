@@ -63,8 +63,19 @@ def test_the_noise_is_found_without_knowing_the_order(noise):
     assert weighing.R2 / noise**2 == pytest.approx(1.0, rel=0.2)
 
 
+def test_the_noise_of_a_short_record_is_not_told_too_small():
+    """Nine parameters fitted to some sixty samples take a seventh of the squares with them."""
+    found = [weigh(record(*driven(samples=66, seed=seed)), FEW).R2 for seed in range(60)]
+    assert np.mean(found) / 0.3**2 == pytest.approx(1.05, abs=0.1)
+
+
 def test_a_given_noise_is_used():
     assert weigh(record(*driven()), FEW, R2=0.5).R2 == 0.5
+
+
+@pytest.mark.parametrize("R2", [None, 0.09])
+def test_every_sample_counts_alike_without_a_floor(R2):
+    assert weigh(record(*driven()), FEW, R2=R2).posterior.min() < 1e-9
 
 
 def test_a_record_that_never_comes_to_rest_is_centred_where_it_would():
