@@ -57,12 +57,15 @@ class Outcome:
         Whether every output is known to be off.
     hottest_c : float
         Highest good reading, in degC; minus infinity without one.
+    reached : bool
+        Whether the band was reached, so that there was a test signal at all.
     """
 
     ending: Ending
     why: str
     off_confirmed: bool
     hottest_c: float
+    reached: bool
 
 
 def plan(
@@ -182,7 +185,8 @@ class Trial:
             raise self._failure
         if not self.loop.stopping:
             self._ending = Ending.FINISHED
-        return Outcome(self._ending, self._why, confirmed, self._hottest_c)
+        reached = not self._course.approaching
+        return Outcome(self._ending, self._why, confirmed, self._hottest_c, reached)
 
     def interrupt(self) -> None:
         """End the run after the cycle under way; a signal handler may call it."""

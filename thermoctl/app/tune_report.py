@@ -82,6 +82,7 @@ class Report:
             "why": outcome.why,
             "off_confirmed": outcome.off_confirmed,
             "hottest_c": hottest_c if math.isfinite(hottest_c) else None,
+            "reached": outcome.reached,
             "signal": dataclasses.asdict(self.excitation),
             "samples": 0 if self.record is None else len(self.record.t_s),
             **found,
@@ -99,6 +100,11 @@ class Report:
             f" power, {plan.bottom_c:g} to {plan.top_c:g} °C, {duration(plan.duration_s)}",
             f"Ended    {_ending_words(outcome)}",
         ]
+        if not outcome.reached:
+            lines.append(
+                f"Band     not reached: {plan.middle_c:g} °C, where the test signal begins, needs a"
+                " longer --duration, or a set point nearer to where the loop is"
+            )
         if self.tuning is None:
             return [*lines, f"Nothing was learnt: {self.why_nothing}"]
         lines += tuning_lines(self.tuning)

@@ -80,6 +80,7 @@ def test_the_report_tells_of_the_run(report):
     assert told["samples"] == 601
     assert 37.0 < told["hottest_c"] < 38.5
     assert told["signal"]["top_c"] == 37.5
+    assert told["reached"] is True
 
 
 def test_the_report_tells_of_the_plant_with_bounds(report):
@@ -127,6 +128,13 @@ def test_text_and_files_say_the_same(tmp_path):
     assert "power 0 confirmed" in printed
     assert "Order    given" in printed
     assert "report.json written" in said
+
+
+def test_a_band_that_was_not_reached_is_told():
+    code, printed, _ = run("--sim", "--duration", "4m", "--out", "o")
+    assert code == 0
+    assert "Band     not reached: 36.5 °C" in printed
+    assert json.loads(Path("o/report.json").read_text())["reached"] is False
 
 
 def test_a_loop_of_structure_arx_is_suggested_its_order(tmp_path):
