@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 
 from thermoctl.app.compose import loop_for
+from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
 from thermoctl.app.sim import bench_settings
+from thermoctl.errors import ConfigError
 from thermoctl.runtime.clock import SimulatedClock
 from thermoctl.signals import ManualPower, Mode, Request, SetPoint, State
 
@@ -160,3 +162,12 @@ def test_the_rig_meets_its_figures(row):
 @pytest.mark.parametrize("row", FLEET, ids=lambda row: row.name)
 def test_so_does_any_other_tank_with_the_same_settings(row):
     assert met(row) == {}
+
+
+def test_the_bank_is_given_the_period_of_its_loop_and_nobody_else_may_set_it():
+    document = load(AQUARIUM).model_dump()
+    document["loops"]["tank"].update(controller={"kind": "adaptive"}, period_s=5.0)
+    assert plan_for(load(document).loops["tank"]).controller.bank.period_s == 5.0
+    document["loops"]["tank"]["controller"]["period_s"] = 2.0
+    with pytest.raises(ConfigError, match=r"controller\.period_s: unknown key"):
+        load(document)

@@ -248,3 +248,20 @@ def test_a_plant_that_is_heated_and_cooled_goes_either_way_without_overshoot():
     assert max(waters) < 37.6
     assert min(waters[1200:]) > 30.9
     assert min(waters[1500:1600]) < 31.1  # by its loss alone it would need 720 s
+
+
+def test_temperatures_have_no_zero():
+    laws = [Adaptive(), Adaptive()]
+    beliefs, powers = [law.start() for law in laws], []
+    rng = np.random.default_rng(9)
+    for k in range(200):
+        y, applied = 25.0 + 0.03 * k + 0.01 * rng.standard_normal(), float(k % 60 < 40)
+        asked = []
+        for number, away_c in enumerate((0.0, 300.0)):
+            now = situation(y + away_c, applied, 31.5 + away_c)
+            beliefs[number] = laws[number].observe(beliefs[number], now)
+            asked.append(laws[number].decide(beliefs[number], now)[1])
+        powers.append(asked)
+    here, there = np.array(powers).T
+    assert there == pytest.approx(here, abs=1e-6)
+    assert np.ptp(here) > 0.5
