@@ -265,3 +265,18 @@ def test_temperatures_have_no_zero():
     here, there = np.array(powers).T
     assert there == pytest.approx(here, abs=1e-6)
     assert np.ptp(here) > 0.5
+
+
+@pytest.mark.parametrize("first_c", [85.0, 0.0, -40.0])
+@pytest.mark.parametrize("samples", [1, 5])
+def test_nonsense_in_the_first_readings_is_forgotten_within_the_warm_up(first_c, samples):
+    law, vessel, waters = Adaptive(), Vessel(), []
+    belief, power, y = law.start(), 0.0, 25.0
+    for k in range(900):
+        now = situation(first_c if k < samples else y, power)
+        belief = law.observe(belief, now)
+        belief, power = law.decide(belief, now)
+        y = vessel.reading(power)
+        waters.append(vessel.water_c)
+    assert max(waters) < 37.5 + 0.4
+    assert np.abs(np.array(waters[650:]) - 37.5).max() < 0.05
