@@ -198,7 +198,7 @@ def replay(
         source = f"estimated: robust spread of the errors of a first pass, RLS({NOISE_FORGETTING})"
     else:
         source = "given"
-    conditions = replace(conditions, mean_removed=not keep_mean, R2=R2, R2_source=source)
+    conditions = replace(conditions, R2=R2, R2_source=source)
     runs = [_run(scaled, conditions, law, timer) for law in laws]
     scores, traces = zip(*runs, strict=True)
     return Replay(record, conditions, scores, traces, weighing)
@@ -219,7 +219,7 @@ def _prepare(record: Record, order: Arx, scaling: Scaling, P0: float) -> tuple[S
     counted = scaled.whole[learning:]
     return scaled, Conditions(
         order=order,
-        mean_removed=False,
+        mean_removed=scaling != Scaling(),
         y_centre=scaling.y_centre,
         y_scale=scaling.y_scale,
         u_centre=scaling.u_centre,
