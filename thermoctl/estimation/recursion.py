@@ -9,6 +9,9 @@ covariance is inflated afterwards.
     \theta \leftarrow \theta + P\varphi\, e / S, \qquad
     P \leftarrow \lambda\,(P - P\varphi\varphi^T P / S) + R_1
 
+The letters of `RecursiveLaw.update`: `rows` are theta and P (`thermoctl.estimation.stack`), `w`
+their product with phi, which begins with the prediction and goes on with P phi.
+
 Implements section 2 of ``docs/theory.md``.
 """
 
@@ -32,6 +35,7 @@ from thermoctl.estimation.belief import (
     scalar,
     shown,
 )
+from thermoctl.estimation.stack import stack, unstacked
 from thermoctl.quantities import Array, is_finite_number
 from thermoctl.signals import Estimate
 
@@ -98,37 +102,38 @@ class RecursiveLaw(ABC):
         """
         if not (isinstance(phi, np.ndarray) and phi.dtype is _FLOAT):
             phi = floats("phi", phi)
-        try:
-            theta, P = belief.theta, belief.P
-        except AttributeError as error:
-            raise TypeError(f"belief must be an Estimate, got {type(belief).__name__}") from error
-        if phi.shape != theta.shape:
-            raise ValueError(f"phi must have shape {theta.shape}, got {phi.shape}")
+        if not isinstance(belief, Estimate):
+            raise TypeError(f"belief must be an Estimate, got {type(belief).__name__}")
+        if phi.shape != belief.theta.shape:
+            raise ValueError(f"phi must have shape {belief.theta.shape}, got {phi.shape}")
         # Plain floats add up without a warning; the comparison is false for NaN. Once phi, and
         # below e, are known to be sane, nothing here can overflow.
         if not sum(map(abs, phi.tolist())) < LARGEST:
             return rejected(belief)
-        P_phi = P.dot(phi)  # ndarray.dot, not @: it is twice as fast on small arrays
-        e = scalar("y", y) - float(theta.dot(phi))
-        q = max(float(phi.dot(P_phi)), 0.0)  # rounding can leave a vanishing one below zero
-        S, inflation = self.weigh(q, e, len(theta), NUMBERS)
+        n, rows = len(phi), stack(belief)
+        w = rows.dot(phi)  # ndarray.dot, not @: it is twice as fast on small arrays
+        e = scalar("y", y) - w.item(0)
+        q = float(phi.dot(w[1:]))
+        if q < 0.0:  # which rounding can leave of a vanishing one
+            q = 0.0
+        S, inflation = self.weigh(q, e, n, NUMBERS)
         if not e * e < LARGEST * S < math.inf:
             return rejected(belief)
-        root = math.sqrt(S)
-        g = P_phi / root
-        theta = theta + g * (e / root)  # O21 (18), (19)
-        # g g' is symmetric to the last bit, and so P stays, without a second pass over it.
-        P = P - np.multiply.outer(g, g)  # O21 (21)
+        # theta gains g e / sqrt(S) while P loses g g', where g = P phi / sqrt(S): with the root
+        # on both sides P stays symmetric to the last bit.
+        w[0] = -e
+        w /= math.sqrt(S)
+        rows = rows - w[:, None].dot(w[None, 1:])  # O21 (18), (19), (21)
+        P = rows[1:]
         if inflation != 1.0:
             P *= inflation  # O21 (25), or (13) with 1/lambda
         R1 = self.R1
-        if isinstance(R1, np.ndarray):
-            P += drift(R1, len(theta))  # O21 (20)
-        elif R1:
-            P += R1 * identity(len(theta))  # O21 (20)
-        if not float(np.vdot(P, P)) + float(theta.dot(theta)) < LARGEST * LARGEST:
+        if isinstance(R1, np.ndarray) or R1:
+            P += drift(R1, n)  # O21 (20)
+        flat = rows.ravel()
+        if not flat.dot(flat) < LARGEST * LARGEST:
             return rejected(belief)
-        return Estimate(frozen(theta), frozen(P), e, S, inflation, False)
+        return unstacked(rows, e, S, inflation)
 
 
 def rejected(belief: Estimate) -> Estimate:
@@ -149,7 +154,7 @@ def checked_drift(value: float | Array) -> float | Array:
 def drift(R1: float | Array, n: int) -> Array:
     """Return R1 as a matrix of shape (n, n); ``ValueError`` if it has another."""
     if not isinstance(R1, np.ndarray):
-        return R1 * identity(n)
+        return _diagonal(R1, n)
     if R1.shape != (n, n):
         raise ValueError(f"R1 must be a float or of shape ({n}, {n}), got {R1.shape}")
     return R1
@@ -159,3 +164,9 @@ def drift(R1: float | Array, n: int) -> Array:
 def identity(n: int) -> Array:
     """Return the read-only unit matrix of size `n`."""
     return frozen(np.eye(n))
+
+
+@lru_cache(maxsize=32)
+def _diagonal(variance: float, n: int) -> Array:
+    """Return the read-only matrix of size `n` with `variance` on its diagonal."""
+    return frozen(variance * identity(n))

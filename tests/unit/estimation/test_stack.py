@@ -1,0 +1,75 @@
+"""Estimates whose theta and P lie in one array."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from thermoctl.estimation import CorrectedKalman, start
+from thermoctl.estimation.stack import Stacked, stack
+from thermoctl.signals import Estimate
+
+LAW = CorrectedKalman(1e-3, 0.5)
+PHI, Y = np.array([0.3, -1.2]), 0.7
+
+
+def learned() -> Stacked:
+    """Return a belief that has met twenty samples."""
+    rng, belief = np.random.default_rng(3), start(2)
+    for _ in range(20):
+        belief = LAW.update(belief, rng.normal(size=2), float(rng.normal()))
+    assert isinstance(belief, Stacked)
+    return belief
+
+
+def assert_same(one: Estimate, other: Estimate) -> None:
+    """Check that two estimates agree to the last bit."""
+    assert one.theta.tolist() == other.theta.tolist()
+    assert one.P.tolist() == other.P.tolist()
+    assert (one.innovation, one.innovation_var) == (other.innovation, other.innovation_var)
+
+
+def test_theta_and_p_are_the_rows_of_the_stack():
+    belief = learned()
+    assert np.shares_memory(belief.theta, belief.rows)
+    assert stack(belief).tolist() == [belief.theta.tolist(), *belief.P.tolist()]
+
+
+def test_what_an_update_returns_cannot_be_written_to():
+    belief = learned()
+    for values in (belief.theta, belief.P, belief.rows):
+        with pytest.raises(ValueError, match="read-only"):
+            values[0] = 1.0
+
+
+def test_an_estimate_put_together_by_hand_learns_what_a_stacked_one_learns():
+    belief = learned()
+    by_hand = Estimate(belief.theta, belief.P)
+    assert_same(LAW.update(by_hand, PHI, Y), LAW.update(belief, PHI, Y))
+
+
+def test_a_belief_with_another_theta_or_p_learns_from_that_one():
+    belief = learned()
+    for change in ({"theta": np.array([5.0, 6.0])}, {"P": 3.0 * np.eye(2)}):
+        changed = replace(belief, **change)
+        by_hand = Estimate(changed.theta, changed.P)
+        assert_same(LAW.update(changed, PHI, Y), LAW.update(by_hand, PHI, Y))
+
+
+@pytest.mark.parametrize(
+    "copied", [copy.deepcopy, lambda belief: pickle.loads(pickle.dumps(belief))]
+)
+def test_a_copied_belief_learns_what_the_first_one_learns(copied):
+    belief = learned()
+    assert_same(LAW.update(copied(belief), PHI, Y), LAW.update(belief, PHI, Y))
+
+
+def test_a_refused_sample_leaves_the_belief_as_it_was():
+    belief = learned()
+    refused = LAW.update(belief, PHI, np.nan)
+    assert refused.rejected
+    assert_same(LAW.update(refused, PHI, Y), LAW.update(belief, PHI, Y))
