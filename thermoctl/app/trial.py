@@ -24,7 +24,7 @@ NAMES = Columns("temperature_c", "accepted_power", "t_s")
 """Columns of the record that is made, as the history calls them."""
 
 FEWEST_PERIODS = 240
-"""Periods a run needs: what the usual candidates take, and half a minute at one a second."""
+"""Periods a run needs: 149 whole samples for the usual candidates, the rest to heat up."""
 
 LATE_PERIODS = 10.0
 """Periods after which a run ends that should have ended by itself."""
