@@ -187,20 +187,19 @@ class LainiotisBank:
             return self._with(before.marked())
         u_past = pushed(before.u_past, u)
         phi = np.concatenate((-before.y_past, u_past, ZERO))[layout.lags]  # O21 (3)
-        theta, P, e = np.empty_like(phi), np.empty_like(before.P), np.empty(phi.shape[1])
+        rows, e = np.empty_like(before.rows), np.empty(phi.shape[1])
         R1 = drift(self.Q, len(phi))[:, :, None] if self.Q else None
-        after = (theta, P, e, np.empty_like(e))
+        after = (rows, e, np.empty_like(e))
         with np.errstate(all="ignore"):  # what overflows here is found in the result
-            S = advance(self._law, before.theta, before.P, phi, np.full_like(e, y), R1, after)
-            if not usable(phi, S, theta, P, e).all():
+            S = advance(self._law, before.rows, phi, np.full_like(e, y), R1, after)
+            if not usable(phi, S, rows, e).all():
                 return self._with(before.marked())
         log_L = -0.5 * (np.log(S) + e * e / S)  # ALF (7), (8)
         log_posterior = _floored(before.log_posterior + log_L, self.floor)  # ALF (6)
         predictions = (before.theta * phi).sum(axis=0)
         return self._with(
             _Belief(
-                frozen(theta),
-                frozen(P),
+                frozen(rows),
                 frozen(log_posterior),
                 frozen(np.exp(log_posterior)),
                 pushed(before.y_past, y),
@@ -245,17 +244,28 @@ class LainiotisBank:
 class _Belief:
     """What k filters of p padded coefficients believe; arrays read-only, candidates last.
 
-    The past runs newest first, as far back as any candidate looks.
+    `rows`, shape (p + 1, p, k), is theta on top of P. The past runs newest first, as far back as
+    any candidate looks.
     """
 
-    theta: Array
-    P: Array
+    rows: Array
     log_posterior: Array
     posterior: Array
     y_past: Array
     u_past: Array
     prediction: float = math.nan
     rejected: bool = False
+
+    @property
+    def theta(self) -> Array:
+        """Coefficients of each candidate, shape (p, k)."""
+        theta: Array = self.rows[0]
+        return theta
+
+    @property
+    def P(self) -> Array:  # noqa: N802 - P keeps its letter
+        """Their covariances, shape (p, p, k)."""
+        return self.rows[1:]
 
     def marked(self) -> _Belief:
         """Return this belief with the mark that a sample was not used."""
@@ -289,8 +299,7 @@ class _Layout:
         """Return what is believed before the first sample."""
         p, k = self.lags.shape
         return _Belief(
-            frozen(np.zeros((p, k))),
-            frozen(np.repeat(P0 * identity(p)[:, :, None], k, axis=2)),
+            frozen(np.repeat(np.vstack((np.zeros(p), P0 * identity(p)))[:, :, None], k, axis=2)),
             frozen(np.full(k, -math.log(k))),
             frozen(np.full(k, 1.0 / k)),
             frozen(np.zeros(self.y_memory)),

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from thermoctl.estimation.belief import LARGEST, floats, frozen, start
 from thermoctl.estimation.recursion import ARRAYS, RecursiveLaw, drift
+from thermoctl.estimation.stack import stack
 from thermoctl.quantities import Array
 from thermoctl.signals import Estimate
 
@@ -83,76 +84,95 @@ def run_batch(
     belief = start(phi.shape[2], P0, theta0)
     columns = np.ascontiguousarray(np.moveaxis(phi, 1, 2))
     with np.errstate(all="ignore"):  # what overflows here is found in the result
-        run = _run(law, y, columns, belief, careful=False)
-        if not _sane(phi, run):
-            run = _run(law, y, columns, belief, careful=True)
-    return run
+        block, sane = _run(law, y, columns, belief, careful=not _sane(columns))
+        if not sane:
+            block, _ = _run(law, y, columns, belief, careful=True)
+    return _unpacked(block, phi.shape[2])
 
 
-def _run(law: RecursiveLaw, y: Array, phi: Array, belief: Estimate, careful: bool) -> Run:
-    """Run the recursion; `careful` looks at every sample and rejects what cannot be used."""
+def _run(
+    law: RecursiveLaw, y: Array, phi: Array, belief: Estimate, careful: bool
+) -> tuple[Array, bool]:
+    """Return what `_unpacked` takes apart, and whether that is what the law would have made of it.
+
+    `careful` looks at every sample and may reject it; without, the run ends where that is needed.
+    """
     (T, R), n = y.shape, phi.shape[1]
     # One block for everything: numpy asks for huge pages from 4 MB on, and page faults would
     # otherwise cost as much as the arithmetic (benchmarks/estimators.py: 13 and 8 ms).
-    block = np.empty((T, n + n * n + 2, R))
-    theta, P = block[:, :n], block[:, n:-2].reshape(T, n, n, R)
-    innovation, inflation = block[:, -2], block[:, -1]
+    block = np.empty((T, (n + 1) * n + 2, R))
+    rows, innovation, inflation = _rows(block, n), block[:, -2], block[:, -1]
     R1 = drift(law.R1, n)[:, :, None] if np.any(law.R1) else None
     before: tuple[Array, ...] = (
-        np.repeat(belief.theta[:, None], R, axis=1),
-        np.repeat(belief.P[:, :, None], R, axis=2),
+        np.repeat(stack(belief)[:, :, None], R, axis=2),
         np.full(R, belief.innovation),
         np.full(R, belief.inflation),
     )
     for t in range(T):
-        after = (theta[t], P[t], innovation[t], inflation[t])
-        S = advance(law, before[0], before[1], phi[t], y[t], R1, after)
+        after = (rows[t], innovation[t], inflation[t])
+        S = advance(law, before[0], phi[t], y[t], R1, after)
         if careful:
-            unusable = ~usable(phi[t], S, *after[:3])
+            unusable = ~usable(phi[t], S, *after[:2])
             for new, old in zip(after, before, strict=True):
                 np.copyto(new, old, where=unusable)
+        elif not _sane(block[t]):
+            return block, False
         before = after
+    return block, True
+
+
+def _rows(block: Array, n: int) -> Array:
+    """Return theta on top of P after each sample, shape (T, n + 1, n, R)."""
+    T, _, R = block.shape
+    return block[:, :-2].reshape(T, n + 1, n, R)
+
+
+def _unpacked(block: Array, n: int) -> Run:
+    """Return the trajectories that lie in `block`, replications second."""
+    rows = _rows(block, n)
     return Run(
-        frozen(np.moveaxis(theta, 1, 2)),
-        frozen(np.moveaxis(P, 3, 1)),
-        frozen(innovation),
-        frozen(inflation),
+        frozen(np.moveaxis(rows[:, 0], 1, 2)),
+        frozen(np.moveaxis(rows[:, 1:], 3, 1)),
+        frozen(block[:, -2]),
+        frozen(block[:, -1]),
     )
 
 
 def advance(
     law: RecursiveLaw,
-    theta: Array,
-    P: Array,
+    rows: Array,
     phi: Array,
     y: Array,
     R1: Array | None,
-    after: tuple[Array, Array, Array, Array],
+    after: tuple[Array, Array, Array],
 ) -> Array:
     """Write what each replication believes after a sample into `after`, and return S.
 
-    `after` is theta, P, e and the inflation. `theta` and `phi` have shape (n, R), P has (n, n, R)
-    and `y`, e, S and the inflation have (R,).
+    `after` is the new rows, e and the inflation, none of it an array that is read. Rows, theta on
+    top of P as in `thermoctl.estimation.stack`, have shape (n + 1, n, R), `phi` has (n, R), `R1`
+    (n, n, 1), and `y`, e, S and the inflation have (R,).
     """
-    new_theta, new_P, e, inflation = after
-    P_phi = _dot(P, phi)  # P is symmetric: its rows are its columns
-    np.subtract(y, _dot(theta, phi), out=e)
-    S, inflation[:] = law.weigh(np.maximum(_dot(P_phi, phi), 0.0), e, len(phi), ARRAYS)
-    root = np.sqrt(S)
-    g = P_phi / root
-    np.add(theta, g * (e / root), out=new_theta)  # O21 (18), (19)
-    np.subtract(P, g[:, None] * g, out=new_P)  # O21 (21)
-    new_P *= inflation  # O21 (25), or (13) with 1/lambda
+    new_rows, e, inflation = after
+    w = _dot(rows.swapaxes(0, 1), phi)
+    np.subtract(y, w[0], out=e)
+    q = _dot(w[1:], phi)
+    S, inflation[:] = law.weigh(np.maximum(q, 0.0, out=q), e, len(phi), ARRAYS)
+    np.negative(e, out=w[0])
+    w /= np.sqrt(S)
+    np.multiply(w[:, None], w[1:], out=new_rows)
+    np.subtract(rows, new_rows, out=new_rows)  # O21 (18), (19), (21)
+    P = new_rows[1:]
+    P *= inflation  # O21 (25), or (13) with 1/lambda
     if R1 is not None:
-        new_P += R1  # O21 (20)
+        P += R1  # O21 (20)
     return S
 
 
-def usable(phi: Array, S: Array, theta: Array, P: Array, e: Array) -> npt.NDArray[np.bool_]:
+def usable(phi: Array, S: Array, rows: Array, e: Array) -> npt.NDArray[np.bool_]:
     """Return where a law would take the sample, shape (R,); false for NaN."""
-    size = (P * P).sum(axis=(0, 1)) + (theta * theta).sum(axis=0)
     usable: npt.NDArray[np.bool_] = np.abs(phi).sum(axis=0) < LARGEST
-    usable &= (e * e < LARGEST * S) & np.isfinite(S) & (size < LARGEST * LARGEST)
+    usable &= (e * e < LARGEST * S) & np.isfinite(S)
+    usable &= (rows * rows).sum(axis=(0, 1)) < LARGEST * LARGEST
     return usable
 
 
@@ -164,9 +184,7 @@ def _dot(a: Array, b: Array) -> Array:
     return total
 
 
-def _sane(phi: Array, run: Run) -> bool:
-    """Return whether everything is far from what `update` rejects; false for NaN."""
-    return all(
-        values.size == 0 or (values.max() < SANE and values.min() > -SANE)
-        for values in (phi, run.innovation, run.theta, run.P)
-    )
+def _sane(values: Array) -> bool:
+    """Return whether all are far from what `update` rejects; false for NaN."""
+    flat = values.ravel()  # one pass for the sum of squares; the extremes would take two
+    return bool(flat.dot(flat) < SANE * SANE)

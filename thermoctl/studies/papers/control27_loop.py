@@ -136,8 +136,9 @@ def close_loop(law: RecursiveLaw | None, scenario: Scenario, noise: Array) -> Lo
     """
     replications = noise.shape[1]
     y, u = np.empty((SAMPLES + 1, replications)), np.empty((SAMPLES, replications))
-    theta = np.zeros((SAMPLES + 1, 1, replications))
-    P = np.full((SAMPLES + 1, 1, 1, replications), P0)
+    rows = np.zeros((SAMPLES + 1, 2, 1, replications))
+    theta, P = rows[:, 0], rows[:, 1]
+    P[:] = P0
     e, inflation = np.empty(replications), np.empty(replications)
     R1 = None if law is None or not np.any(law.R1) else drift(law.R1, 1)[:, :, None]
     if law is None:
@@ -147,6 +148,6 @@ def close_loop(law: RecursiveLaw | None, scenario: Scenario, noise: Array) -> Lo
         u[t] = scenario.setpoint[t] - theta[t, 0] * y[t]  # O21 (23)
         y[t + 1] = scenario.pole[t] * y[t] + u[t] + noise[t]  # O21 (27)
         if law is not None:
-            after = (theta[t + 1], P[t + 1], e, inflation)
-            advance(law, theta[t], P[t], y[t : t + 1], y[t + 1] - u[t], R1, after)
-    return Loop(y[1:], scenario.setpoint, u, theta[1:, 0], P[1:, 0, 0])
+            after = (rows[t + 1], e, inflation)
+            advance(law, rows[t], y[t : t + 1], y[t + 1] - u[t], R1, after)
+    return Loop(y[1:], scenario.setpoint, u, theta[1:, 0], P[1:, 0])
