@@ -3,7 +3,7 @@
     RawSample -> Measurement -> Estimate -> Command -> Step -> Cycle
 
 Requests travel the other way, through one queue that is read at the top of a cycle: `SetPoint`,
-`ManualPower`, `Mode`, `Acknowledge`.
+`ManualPower`, `Mode`, `ChooseController`, `Acknowledge`.
 """
 
 from __future__ import annotations
@@ -97,7 +97,14 @@ class Acknowledge:
     code: str | None = None
 
 
-Request = Mode | SetPoint | ManualPower | Acknowledge
+@dataclass(frozen=True, slots=True)
+class ChooseController:
+    """Request: put the controller called `name` in charge, its rival in the shadow."""
+
+    name: str
+
+
+Request = Mode | SetPoint | ManualPower | ChooseController | Acknowledge
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,6 +148,34 @@ class Beliefs:
     a: float | None = None
     a_sd: float | None = None
     holding_power: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ShadowScore:
+    """Two controllers side by side over the last minutes; None where nobody can tell.
+
+    Both saw the same samples, but only one of them moved the plant. So this says how far the two
+    are apart and whose model foresees the readings better, NOT how well the shadow would hold the
+    set point: a restless shadow is never punished by the temperatures it would have caused.
+
+    Parameters
+    ----------
+    span_s : float
+        Time that is looked at, in s: only samples at which the one in charge decided the power.
+    apart : float
+        Mean distance of the two powers, in [0, 1].
+    travel_per_min, shadow_travel_per_min : float
+        How far each moved what it asked for, in full ranges a minute.
+    surprise_k, shadow_surprise_k : float or None
+        Root mean square of reading minus what the law had expected of it, in K.
+    """
+
+    span_s: float
+    apart: float
+    travel_per_min: float
+    shadow_travel_per_min: float
+    surprise_k: float | None = None
+    shadow_surprise_k: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +236,11 @@ class Event:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """Everything the regulator made of one measurement."""
+    """Everything the regulator made of one measurement.
+
+    `shadow` is the name of the controller that is asked beside `controller`, `shadow_power` what it
+    would have given, within the limit of power; None where there is none, or no answer.
+    """
 
     t_s: float
     measurement: Measurement
@@ -214,6 +253,9 @@ class Step:
     beliefs: Beliefs = field(default_factory=Beliefs)
     alarms: tuple[Alarm, ...] = ()
     events: tuple[Event, ...] = ()
+    shadow: str | None = None
+    shadow_power: float | None = None
+    shadow_score: ShadowScore | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
