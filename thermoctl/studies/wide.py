@@ -119,11 +119,22 @@ def _least_squares(scaled: Scaled) -> tuple[Array, Array, Array]:
         phi = np.column_stack((phi, np.ones(len(phi))))
         gram += phi.T @ phi
         moment += phi.T @ scaled.y[block]
-    # An input may never move: then this is no inverse, and leaves its b's at 0.
-    inverse: Array = np.asarray(np.linalg.pinv(gram, rcond=_RCOND, hermitian=True), np.float64)
+    inverse = _inverse(gram)
     theta = inverse @ moment
     errors = [scaled.y[block] - phi @ theta[:-1] - theta[-1] for block, phi in scaled.blocks()]
     return theta, inverse, np.concatenate(errors)
+
+
+def _inverse(gram: Array) -> Array:
+    """Return the inverse, with a large variance where the record is silent.
+
+    An input that hardly moves is no other regressor than the constant. A pseudo-inverse would call
+    such directions certain, see test_a_power_that_moved_once_claims_no_gain.
+    """
+    information, directions = np.linalg.eigh(gram)
+    information = np.maximum(information, _RCOND * information[-1])
+    inverse: Array = (directions / information) @ directions.T
+    return inverse
 
 
 def _power(errors: Array) -> float:

@@ -87,3 +87,11 @@ def test_an_input_that_does_nothing_says_nothing():
         )
         is None
     )
+
+
+@pytest.mark.parametrize("moved", [slice(1), slice(20), slice(-5, None), slice(-20, None)])
+def test_a_power_that_moved_once_claims_no_gain(moved):
+    """Too early or too late for all lags to see it: the rest of the power is a constant."""
+    power = np.ones(600)
+    power[moved] = 0.0
+    assert plant_words(tank(noise=0.02, samples=600, power=power), 37.5) is None
