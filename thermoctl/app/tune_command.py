@@ -231,14 +231,16 @@ def _learnt(
 
 
 def _tell(report: Report, asked: _Asked) -> None:
-    """Print the report first: a disk that is full must not cost what a run has taught."""
-    if asked.as_json:
-        print_json(report.as_json(asked.out))
-    else:
-        spell = str if is_utf8(sys.stdout.encoding) else ascii_only
-        for line in report.lines():
-            click.echo(spell(line))
-    say(f"{path} written" for path in report.write(asked.out))
+    """Print and write the report; if one fails, the other must not cost what a run has taught."""
+    try:
+        if asked.as_json:
+            print_json(report.as_json(asked.out))
+        else:
+            spell = str if is_utf8(sys.stdout.encoding) else ascii_only
+            for line in report.lines():
+                click.echo(spell(line))
+    finally:
+        say(f"{path} written" for path in report.write(asked.out))
 
 
 def _code(outcome: Outcome) -> int:

@@ -1,6 +1,7 @@
 """The command that commissions a loop: what it refuses, asks, prints and leaves behind."""
 
 import csv
+import errno
 import json
 import os
 import signal
@@ -130,17 +131,29 @@ def test_text_and_files_say_the_same(tmp_path):
     assert "report.json written" in said
 
 
-def test_a_band_that_was_not_reached_is_told():
+def test_a_run_is_written_where_it_cannot_be_printed(monkeypatch):
+    def full(content):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("thermoctl.app.tune_command.print_json", full)
+    code, _, said = run("--sim", "--duration", "5m", "--order", "2,1,4", "--out", "o", "--json")
+    assert code == 1
+    assert "No space left on device" in said
+    assert {each.name for each in Path("o").iterdir()} >= {"report.txt", "report.json", "run.csv"}
+
+
+def test_a_band_that_was_not_reached_is_told_and_nothing_suggested():
     code, printed, _ = run("--sim", "--duration", "4m", "--out", "o")
     assert code == 0
     assert "Band     not reached: 36.5 °C" in printed
-    assert json.loads(Path("o/report.json").read_text())["reached"] is False
+    report = json.loads(Path("o/report.json").read_text())
+    assert (report["reached"], report["plant"], report["suggestion"]) == (False, None, None)
 
 
 def test_a_loop_of_structure_arx_is_suggested_its_order(tmp_path):
     config = Path("arx.toml")
     config.write_text(BOARD + '[loops.tank.model]\nstructure = "arx"\n')
-    code, printed, _ = run("--sim", "-c", config, "--order", "2,1,4", "--duration", "5m", "--json")
+    code, printed, _ = run("--sim", "-c", config, "--order", "2,1,4", "--duration", "9m", "--json")
     assert code == 0
     keys = json.loads(printed)["suggestion"]
     assert (keys["n"], keys["m"], keys["delay"]) == (2, 1, 4)
