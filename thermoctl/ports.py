@@ -202,3 +202,16 @@ class Controller(Protocol):
         it is gone, with ``active=False``.
         """
         ...
+
+
+@runtime_checkable
+class Foretelling(Protocol):
+    """A controller that can also tell how well it foresees; no law has to."""
+
+    def surprise_k(self, belief: Any, situation: Situation) -> float:
+        """Return this reading minus what was expected of it, in K; NaN: not known.
+
+        `belief` is the one before this sample. What was expected may use the power that was
+        applied meanwhile, for that is no merit of the law.
+        """
+        ...

@@ -112,13 +112,13 @@ def schema() -> dict[str, Any]:
     whole["properties"]["boards"]["additionalProperties"] = {"oneOf": boards}
     loop = definitions["LoopTable"]["properties"]
     controllers = [_law_schema(plugins.CONTROLLERS, kind, {}) for kind in _kinds("controllers")]
-    loop["controller"] = {
-        "description": loop["controller"]["description"],
-        "default": LoopTable.model_fields["controller"]
-        .get_default(call_default_factory=True)
-        .model_dump(),
-        "anyOf": [{"enum": _kinds("controllers")}, *controllers],
-    }
+    for key in ("controller", "shadow"):
+        default = LoopTable.model_fields[key].get_default(call_default_factory=True)
+        loop[key] = {
+            "description": loop[key]["description"],
+            "default": None if default is None else default.model_dump(),
+            "anyOf": [{"enum": _kinds("controllers")}, *controllers],
+        }
     shared = dict(definitions["EstimatorTable"]["properties"])
     del shared["kind"]
     estimators = [_law_schema(plugins.ESTIMATORS, kind, shared) for kind in _kinds("estimators")]

@@ -74,7 +74,7 @@ def contender(text: str, table: LoopTable, *, nameplate: bool = False) -> Conten
         require(kind)
     options = _options(text, rest)
     law = Options.model_validate({"kind": kind, **options})
-    own = table.model_copy(update={"controller": law})
+    own = table.model_copy(update={"controller": law, "shadow": None})
     build = partial(_plan, own, nameplate=nameplate)
     build(plant("rig", 0))  # so that a bad option is told before anything is run
     identity = json.dumps([own.model_dump(mode="json"), nameplate, _origin(kind)], sort_keys=True)
@@ -107,7 +107,7 @@ def _plan(table: LoopTable, where: Plant, *, nameplate: bool) -> Plan:
     if kind not in BASELINES:
         return plan_for(table)
     law = plugins.build(BASELINES[kind], table.controller.options)
-    stand_in = table.model_copy(update={"controller": Options(kind="on-off")})
+    stand_in = table.model_copy(update={"controller": Options(kind="on-off"), "shadow": None})
     return replace(plan_for(stand_in), controller=law)
 
 

@@ -14,7 +14,14 @@ from pydantic import BaseModel
 
 from thermoctl.app import plugins
 from thermoctl.app.plugins import BadOption
-from thermoctl.app.tables import ActuatorTable, EstimatorTable, LoopTable, ModelTable, SensorTable
+from thermoctl.app.tables import (
+    ActuatorTable,
+    EstimatorTable,
+    LoopTable,
+    ModelTable,
+    Options,
+    SensorTable,
+)
 from thermoctl.estimation import Guarded, Identifier, RandomWalkKalman
 from thermoctl.estimation.kalman import CorrectedKalman
 from thermoctl.model import actuator as laws
@@ -41,11 +48,15 @@ def plan_for(table: LoopTable) -> Plan:
     with _within("model", table.model):
         structure = _structure(table.model, table.period_s)
     with _within("controller", table.controller):
-        controller = _controller(table, structure)
+        controller = _controller(table, table.controller, structure)
+    shadow = None
+    if table.shadow is not None:
+        with _within("shadow", table.shadow):
+            shadow = _controller(table, table.shadow, structure)
     with _within("estimator", table.estimator):
-        identifier = _identifier(table, structure, getattr(controller, "reference_time_s", 0.0))
+        identifier = _identifier(table, structure, _reference_time_s(controller, shadow))
     with _within("", table):
-        return Plan(_limits(table), identifier, controller, table.setpoint_c, table.mode)
+        return Plan(_limits(table), identifier, controller, table.setpoint_c, table.mode, shadow)
 
 
 def check_parts(table: LoopTable) -> None:
@@ -204,9 +215,15 @@ def _covariance_max(
     return min(P0, most_k2 / max(abs(setpoint_c), 1.0) ** 2)
 
 
-def _controller(table: LoopTable, structure: Arx | KnownGain) -> Controller:
-    law = plugins.find(plugins.CONTROLLERS, table.controller.kind)
-    known, options = plugins.option_names(law), dict(table.controller.options)
+def _reference_time_s(*controllers: Controller | None) -> float:
+    """Return the reference time of the law that steers by the learnt model; 0 without one."""
+    return max(getattr(controller, "reference_time_s", 0.0) for controller in controllers)
+
+
+def _controller(table: LoopTable, chosen: Options, structure: Arx | KnownGain) -> Controller:
+    """Return the law that is `chosen` for this loop, in charge or in shadow."""
+    law = plugins.find(plugins.CONTROLLERS, chosen.kind)
+    known, options = plugins.option_names(law), dict(chosen.options)
     given: dict[str, Any] = {"structure": structure, "period_s": table.period_s}
     injected = {name: value for name, value in given.items() if name in known}
     if isinstance(structure, Arx) and table.estimator.guards.enabled and "gain_min_k" in known:

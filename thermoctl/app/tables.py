@@ -197,6 +197,11 @@ class LoopTable(Table):
         ),
         description="Law in charge in mode auto: a kind, or a table with a kind and its options.",
     )
+    shadow: Options | None = Field(
+        None,
+        description="Another law, as in `controller`: asked beside it, logged, never obeyed; it "
+        "can be put in charge while the loop runs.",
+    )
     model: ModelTable = Field(default_factory=ModelTable)
     estimator: EstimatorTable = Field(
         default_factory=lambda: EstimatorTable.model_validate(
@@ -208,7 +213,7 @@ class LoopTable(Table):
         None, description="Table of the orders that are weighed beside the loop; none when absent."
     )
 
-    @field_validator("controller", mode="before")
+    @field_validator("controller", "shadow", mode="before")
     @classmethod
     def _a_kind_alone_is_a_controller(cls, value: Any) -> Any:
         return {"kind": value} if isinstance(value, str) else value

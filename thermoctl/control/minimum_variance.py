@@ -182,18 +182,25 @@ class SelfTuningMinimumVariance:
         theta, P = situation.estimate.theta, situation.estimate.P
         h, structure = situation.interval_s, self.structure
         holding_power = self._holding(situation)
-        if isinstance(structure, KnownGain):
-            gain = structure.b_k / h if h > 0.0 else None  # given, not learned: it has no sd
-            return Beliefs(gain, None, float(theta[0]), _sd(P, np.ones(1)), holding_power)
-        if structure.n != 1:
-            return Beliefs(holding_power=holding_power)
-        a, a_sd = -float(theta[0]), _sd(P[:1, :1], np.ones(1))
+        a, a_sd = structure.pole(theta, P)
         if not h > 0.0:
             return Beliefs(a=a, a_sd=a_sd, holding_power=holding_power)
+        if isinstance(structure, KnownGain):  # the gain is given, not learned: it has no sd
+            return Beliefs(structure.b_k / h, None, a, a_sd, holding_power)
+        if structure.n != 1:
+            return Beliefs(holding_power=holding_power)
         per_power = structure.y_scale_k / structure.u_scale / h
         gain = float(theta[1:].sum()) * per_power
         gain_sd = _sd(P[1:, 1:], np.full(structure.m, per_power))
         return Beliefs(gain, gain_sd, a, a_sd, holding_power)
+
+    def surprise_k(self, belief: Conditions, situation: Situation) -> float:
+        """Return the innovation of the model in K; NaN when the sample was not used."""
+        estimate, structure = situation.estimate, self.structure
+        if estimate.rejected:
+            return math.nan
+        scale_k = 1.0 if isinstance(structure, KnownGain) else structure.y_scale_k
+        return estimate.innovation * scale_k
 
     def _holding(self, situation: Situation) -> float | None:
         """Return the model's steady power at the set point, or None while it is too vague."""

@@ -49,6 +49,10 @@ class Structure(Protocol):
         """Return the y(t) in degC for which `target` is `value`."""
         ...
 
+    def pole(self, theta: Array, P: Array) -> tuple[float | None, float | None]:
+        """Return the pole of a first-order structure and its standard deviation, else None."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class Arx:
@@ -138,6 +142,12 @@ class Arx:
         """Return the temperature in degC of a centred and scaled one."""
         return self.y_centre_c + self.y_scale_k * value
 
+    def pole(self, theta: Array, P: Array) -> tuple[float | None, float | None]:
+        """Return -a1 and its standard deviation where n is 1, else None."""
+        if self.n != 1:
+            return None, None
+        return -float(theta[0]), math.sqrt(max(float(P[0, 0]), 0.0))
+
 
 @dataclass(frozen=True, slots=True)
 class KnownGain:
@@ -190,6 +200,10 @@ class KnownGain:
     def temperature(self, value: float, u_past: Array) -> float:
         """Return y(t) in degC when ``a y(t-1)`` is `value`."""
         return value + self.b_k * float(u_past[0])  # O21 (27)
+
+    def pole(self, theta: Array, P: Array) -> tuple[float | None, float | None]:
+        """Return a and its standard deviation."""
+        return float(theta[0]), math.sqrt(max(float(P[0, 0]), 0.0))
 
 
 def _require_positive(name: str, value: float) -> None:

@@ -15,6 +15,27 @@ _FAULT = 58
 
 
 @dataclass(frozen=True, slots=True)
+class Failure:
+    """What a law raised: in a sentence, and where."""
+
+    text: str
+    trace: str
+
+
+def attempt(law: Callable[[], T]) -> T | Failure:
+    """Return what `law` returns, or what it raised.
+
+    Anything may come out of a plug-in, so this is the one place below the loop where every
+    exception is caught.
+    """
+    try:
+        return law()
+    except Exception as error:  # noqa: BLE001 - the boundary to third-party laws
+        text = f"expected a result, got {type(error).__name__}: {error}"
+        return Failure(text, traceback.format_exc())
+
+
+@dataclass(frozen=True, slots=True)
 class Guard:
     """Calls what a law offers; a call that raises costs the heat, never the loop.
 
@@ -27,14 +48,9 @@ class Guard:
     supervisor: Supervisor
 
     def call(self, law: Callable[[], T], otherwise: T, code: str, t_s: float) -> T:
-        """Return what `law` returns, or `otherwise` after the fault `code`.
-
-        Anything may come out of a plug-in, so this is the one place below the loop where every
-        exception is caught.
-        """
-        try:
-            return law()
-        except Exception as error:  # noqa: BLE001 - the boundary to third-party laws
-            text = f"expected a result, got {type(error).__name__}: {error}"
-            self.supervisor.fail(code, _FAULT, text, t_s, trace=traceback.format_exc())
+        """Return what `law` returns, or `otherwise` after the fault `code`."""
+        came = attempt(law)
+        if isinstance(came, Failure):
+            self.supervisor.fail(code, _FAULT, came.text, t_s, trace=came.trace)
             return otherwise
+        return came

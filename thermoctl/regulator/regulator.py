@@ -17,12 +17,15 @@ from thermoctl.regulator.guard import Guard
 from thermoctl.regulator.holding import Holding
 from thermoctl.regulator.judge import Verdict
 from thermoctl.regulator.limits import Limits, accept_power
+from thermoctl.regulator.mind import Mind
+from thermoctl.regulator.shadow import Shadow
 from thermoctl.regulator.steering import Steering
 from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import (
     Acknowledge,
     Alarm,
     Beliefs,
+    ChooseController,
     Command,
     Event,
     ManualPower,
@@ -54,11 +57,14 @@ class Plan:
         Set point at the start, in degC.
     mode : Mode
         Mode at the start.
+    shadow : Controller, optional
+        Another law, asked beside the one in charge and not obeyed until it is put in charge.
 
     Raises
     ------
     ValueError
-        The mode is PROGRAM: there is none to begin with.
+        The mode is PROGRAM: there is none to begin with. Or both laws have one name: nobody could
+        choose between them.
     """
 
     limits: Limits
@@ -66,10 +72,15 @@ class Plan:
     controller: Controller
     setpoint_c: float
     mode: Mode = Mode.OFF
+    shadow: Controller | None = None
 
     def __post_init__(self) -> None:
         if self.mode is Mode.PROGRAM:
             raise ValueError("mode must be off, manual or auto at the start, got 'program'")
+        if self.shadow is not None and self.shadow.name == self.controller.name:
+            raise ValueError(
+                f"shadow must be another kind than the controller's, got {self.shadow.name!r} twice"
+            )
 
 
 class Regulator:
@@ -91,7 +102,8 @@ class Regulator:
         self._events: list[tuple[str, dict[str, object]]] = []
         self._supervisor = Supervisor(plan.limits, self._emit)
         self._guard = Guard(self._supervisor)
-        self._steering = Steering(plan.controller, self._guard, self._emit)
+        self._steering = Steering(Mind(plan.controller), self._guard, self._emit)
+        self._shadow = Shadow(plan.shadow, plan.limits.power_max, self._emit)
         self._identified: IdentifierBelief = plan.identifier.start()
         self._foreseen: IdentifierBelief | None = None
         self._holding = Holding()
@@ -134,11 +146,14 @@ class Regulator:
                 self._setpoint_c = accepted_c
             case ManualPower(power):
                 self._manual_power = accept_power(power)
+            case ChooseController(name):
+                self._choose(name)
             case Acknowledge(code):
                 self._supervisor.acknowledge(code)
             case _:
                 raise Refused(
-                    f"expected a Mode, SetPoint, ManualPower or Acknowledge, got {request!r}"
+                    "expected a Mode, SetPoint, ManualPower, ChooseController or Acknowledge, got "
+                    f"{request!r}"
                 )
 
     def _request_mode(self, mode: Mode) -> None:
@@ -150,6 +165,21 @@ class Regulator:
             self._manual_power = self._applied_power()
         self._emit("mode.changed", before=self._mode.value, after=mode.value)
         self._mode = mode
+
+    def _choose(self, name: object) -> None:
+        """Let the controllers in charge and in shadow change places, if `name` is in shadow.
+
+        Bumpless: both have seen every sample, and every power that was applied, from the start.
+        """
+        charge, shadow = self._steering.name, self._shadow.name
+        if isinstance(name, str) and name == charge:
+            return
+        if shadow is None:
+            raise Refused(f"expected {charge!r}, for none is in its shadow, got {name!r}")
+        if not isinstance(name, str) or name != shadow:
+            raise Refused(f"expected {charge!r} or, in its shadow, {shadow!r}, got {name!r}")
+        self._steering.mind = self._shadow.exchanged(self._steering.mind)
+        self._emit("controller.changed", before=charge, after=shadow)
 
     # -- the walk of a sample --------------------------------------------------------------------
 
@@ -163,12 +193,16 @@ class Regulator:
         seen_s = self._limits.seen_s(interval_s)
         self._holding = self._holding.after(temperature_c - self._setpoint_c, applied, seen_s)
         situation = self._situation(t_s, interval_s, temperature_c, applied)
+        self._shadow.observe(situation, self._steering.mind)
         self._steering.observe(situation)
-        beliefs = self._steering.beliefs(situation, self._holding.known)
+        known = self._guard.call(self._model_beliefs, Beliefs(), "estimator.failed", t_s)
+        beliefs = self._steering.beliefs(situation, known)
         state = self._supervisor.rule(t_s, self._ride_s(situation, beliefs))
         asked, reason = self._ask(situation, state, beliefs)
         self._steering.tell_remarks(t_s)
         self._command = self._supervisor.bound(asked, reason, t_s)
+        steered = self._mode is Mode.AUTO and state is State.RUN
+        self._shadow.decide(situation, self._command.power, seen_s, steered=steered)
         self._notice_unknown_power(t_s)
         self._applied = None
         return self._finish(measurement, situation, beliefs)
@@ -262,6 +296,12 @@ class Regulator:
             measured_c,
         )
 
+    def _model_beliefs(self) -> Beliefs:
+        """Return what is known beside every controller: the pole, and the power seen to hold."""
+        estimate = self._identified.estimate
+        a, a_sd = self._plan.identifier.structure.pole(estimate.theta, estimate.P)
+        return Beliefs(a=a, a_sd=a_sd, holding_power=self._holding.known)
+
     def _ride_s(self, situation: Situation, beliefs: Beliefs) -> float:
         """Return how long the model may steer without a sensor: 0 until it is known."""
         if self._mode is not Mode.AUTO:
@@ -313,6 +353,9 @@ class Regulator:
             beliefs=beliefs,
             alarms=self._supervisor.alarms.rows(),
             events=events,
+            shadow=self._shadow.name,
+            shadow_power=self._shadow.power,
+            shadow_score=self._shadow.score,
         )
 
     def _emit(self, name: str, **fields: object) -> None:

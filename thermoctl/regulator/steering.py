@@ -1,15 +1,15 @@
-"""The controller of a loop, together with what it remembers."""
+"""The controller in charge of a loop."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
-from thermoctl.ports import Controller, Situation
+from thermoctl.ports import Situation
 from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.guard import Guard
+from thermoctl.regulator.mind import Mind
 from thermoctl.regulator.supervisor import Emit
 from thermoctl.signals import Beliefs
 
@@ -17,57 +17,50 @@ _FAILED = "controller.failed"
 
 
 class Steering:
-    """Asks a controller and keeps its belief, which a failed call leaves as it was.
+    """Asks the controller in charge; when it fails, that costs the heat.
 
     Parameters
     ----------
-    controller : Controller
-        The law.
+    mind : Mind
+        The controller; another one may take its place between two samples.
     guard : Guard
         What stands between the law and the loop.
     emit : callable
         Called as ``emit(name, **fields)`` when a remark appears and when it is gone.
     """
 
-    def __init__(self, controller: Controller, guard: Guard, emit: Emit) -> None:
-        self._controller = controller
+    def __init__(self, mind: Mind, guard: Guard, emit: Emit) -> None:
+        self.mind = mind
         self._guard = guard
         self._emit = emit
-        self._belief: Any = controller.start()
         self._remarks: Mapping[str, str] = {}
 
     @property
     def name(self) -> str:
         """The name of the controller."""
-        return self._controller.name
+        return self.mind.name
 
     def observe(self, situation: Situation) -> None:
-        """Show the controller a sample, whether it is in charge or not."""
-        self._belief = self._guard.call(
-            lambda: self._controller.observe(self._belief, situation),
-            self._belief,
-            _FAILED,
-            situation.t_s,
-        )
+        """Show the controller a sample, whether its power is wanted or not."""
+        self._guard.call(lambda: self.mind.observe(situation), None, _FAILED, situation.t_s)
 
     def decide(self, situation: Situation) -> object:
         """Return what the controller asks for; 0 when it fails."""
+        nothing: object = 0.0
+        return self._guard.call(
+            lambda: self.mind.decide(situation), nothing, _FAILED, situation.t_s
+        )
 
-        def decide() -> tuple[Any, object]:
-            after, asked = self._controller.decide(self._belief, situation)
-            return after, asked
-
-        failed: tuple[Any, object] = (self._belief, 0.0)
-        self._belief, asked = self._guard.call(decide, failed, _FAILED, situation.t_s)
-        return asked
-
-    def beliefs(self, situation: Situation, observed_power: float | None) -> Beliefs:
-        """Return the controller's words; where it is vague, holding power as observed."""
+    def beliefs(self, situation: Situation, otherwise: Beliefs) -> Beliefs:
+        """Return the controller's words, those of `otherwise` where it says nothing."""
+        mind = self.mind
 
         def beliefs() -> Beliefs:
-            told = self._controller.beliefs(self._belief, situation)
-            if told.holding_power is None and observed_power is not None:
-                return replace(told, holding_power=observed_power)
+            told = mind.controller.beliefs(mind.belief, situation)
+            if told.a is None and otherwise.a is not None:
+                told = replace(told, a=otherwise.a, a_sd=otherwise.a_sd)
+            if told.holding_power is None and otherwise.holding_power is not None:
+                told = replace(told, holding_power=otherwise.holding_power)
             return told
 
         return self._guard.call(beliefs, Beliefs(), _FAILED, situation.t_s)
@@ -77,8 +70,9 @@ class Steering:
         known = is_finite_number(beliefs.holding_power) and math.isfinite(situation.temperature_c)
         if not known:
             return 0.0
+        mind = self.mind
         return self._guard.call(
-            lambda: clamp(self._controller.ride_s(self._belief), 0.0, most_s),
+            lambda: clamp(mind.controller.ride_s(mind.belief), 0.0, most_s),
             0.0,
             _FAILED,
             situation.t_s,
@@ -86,12 +80,12 @@ class Steering:
 
     def tell_remarks(self, t_s: float) -> None:
         """Say which conditions have appeared since the last sample, and which are gone."""
+        mind, before = self.mind, self._remarks
 
         def remarks() -> dict[str, str]:
-            told = self._controller.remarks(self._belief)
+            told = mind.controller.remarks(mind.belief)
             return {str(name): str(text) for name, text in told.items()}
 
-        before = self._remarks
         self._remarks = self._guard.call(remarks, dict(before), _FAILED, t_s)
         for name in before.keys() - self._remarks.keys():
             self._emit(name, active=False)

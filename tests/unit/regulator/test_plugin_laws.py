@@ -3,13 +3,14 @@
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+import numpy as np
 import pytest
 
 from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
 from thermoctl.estimation import Identifier
 from thermoctl.regulator import Plan, Regulator
-from thermoctl.signals import Beliefs, ManualPower, Measurement, Mode, Quality, State
+from thermoctl.signals import Beliefs, Estimate, ManualPower, Measurement, Mode, Quality, State
 
 HOLDING = Beliefs(holding_power=0.2)
 TABLE = {"setpoint_c": 37.5, "trip_above_c": 60.0, "mode": "auto"}
@@ -88,7 +89,10 @@ def test_an_odd_answer_of_a_controller_is_power_0_or_its_own_power_and_no_except
     assert steps[-1].state is State.SAFE
 
 
-@pytest.mark.parametrize("answer", [None, 3.0, "theta"])
+NO_POLE = Estimate(np.array(1.0), np.zeros((1, 1)))
+
+
+@pytest.mark.parametrize("answer", [None, 3.0, "theta", NO_POLE])
 def test_an_odd_answer_of_an_estimator_is_safe_and_no_exception(answer):
     whole = plan()
     identifier = Identifier(whole.identifier.structure, Odd(learns=answer), (1.0,), 1.0)

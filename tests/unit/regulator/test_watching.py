@@ -72,7 +72,7 @@ def test_without_a_reading_it_is_shown_that_there_was_none(quality):
     see(subject, 2, 37.6)
     see(subject, 3, 52.0)  # an outlier is no reading either
     see(subject, 4, 37.8)
-    shown = [situation.measured_c for situation in subject._steering._belief]
+    shown = [situation.measured_c for situation in subject._steering.mind.belief]
     assert shown == pytest.approx([37.5, math.nan, 37.6, math.nan, 37.8], nan_ok=True)
 
 
@@ -82,7 +82,7 @@ def test_it_is_shown_the_power_that_was_applied_whoever_gave_it():
     see(subject, 0)
     subject.applied(0.28)
     see(subject, 1)
-    assert subject._steering._belief[-1].applied == 0.28
+    assert subject._steering.mind.belief[-1].applied == 0.28
 
 
 def test_a_remark_is_told_when_it_appears_and_when_it_is_gone_and_not_in_between():

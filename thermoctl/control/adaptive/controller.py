@@ -12,7 +12,7 @@ from typing import ClassVar, Literal
 
 from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.coasting import Outlook, power_for
-from thermoctl.control.adaptive.filters import GAIN_MIN
+from thermoctl.control.adaptive.filters import GAIN_MIN, T, X, Z
 from thermoctl.control.adaptive.plant_belief import (
     PlantBelief,
     gain,
@@ -133,6 +133,16 @@ class Adaptive:
         bounds = self.bank.bounds
         r_c = self._sign * setpoint_c
         return belief, power_for(outlook, r_c, self.calmness, self.period_s, bounds)
+
+    def surprise_k(self, belief: AdaptiveBelief, situation: Situation) -> float:
+        """Return reading minus what all hypotheses together expected; NaN beyond one period."""
+        bank = belief.bank
+        periods = (belief.behind_s + situation.interval_s) / self.period_s
+        if bank.block is None or belief.since_s > 0.0 or not 0.5 <= periods < 1.5:
+            return math.nan
+        x = bank.block[:, X]
+        expected = x[Z] + self.bank.hypotheses.sensor_step * (x[T] - x[Z])
+        return self._sign * situation.measured_c - float(bank.weights.share.dot(expected))
 
     def beliefs(self, belief: AdaptiveBelief, situation: Situation) -> Beliefs:
         """Return gain with its error, and holding power once it is known to .05."""

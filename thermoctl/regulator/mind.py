@@ -1,0 +1,45 @@
+"""A controller, together with what it remembers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from thermoctl.ports import Controller, Foretelling, Situation
+
+
+class Mind:
+    """Keeps the belief of a controller, which a failed call leaves as it was.
+
+    Every method may raise whatever the law raises; who holds the mind stands guard.
+
+    Parameters
+    ----------
+    controller : Controller
+        The law.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        self.controller = controller
+        self.belief: Any = controller.start()
+        self._foretells = controller if isinstance(controller, Foretelling) else None
+
+    @property
+    def name(self) -> str:
+        """The name of the controller."""
+        return self.controller.name
+
+    def surprise_k(self, situation: Situation) -> float:
+        """Return reading minus what was expected, asked before `observe`; or NaN."""
+        if self._foretells is None:
+            return math.nan
+        return self._foretells.surprise_k(self.belief, situation)
+
+    def observe(self, situation: Situation) -> None:
+        """Show the controller a sample, whether it is in charge or not."""
+        self.belief = self.controller.observe(self.belief, situation)
+
+    def decide(self, situation: Situation) -> object:
+        """Return what the controller asks for, of whatever kind."""
+        self.belief, asked = self.controller.decide(self.belief, situation)
+        return asked

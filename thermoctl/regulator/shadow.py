@@ -1,0 +1,111 @@
+"""A second controller, asked at every sample and never obeyed."""
+
+from __future__ import annotations
+
+import math
+
+from thermoctl.ports import Controller, Situation
+from thermoctl.quantities import clamp, is_finite_number
+from thermoctl.regulator.guard import Failure, attempt
+from thermoctl.regulator.mind import Mind
+from thermoctl.regulator.supervisor import Emit
+from thermoctl.regulator.tally import Round, Tally
+from thermoctl.signals import ShadowScore
+
+
+class Shadow:
+    """Keeps the controller in shadow, and the score between it and the one in charge.
+
+    One that fails is dropped for good, with an event: it costs neither heat nor patience.
+
+    Parameters
+    ----------
+    controller : Controller or None
+        The law; None for a loop without a shadow, which then costs nothing.
+    power_max : float
+        Most power that is ever given.
+    emit : callable
+        Called as ``emit(name, **fields)`` when the law has failed.
+    """
+
+    def __init__(self, controller: Controller | None, power_max: float, emit: Emit) -> None:
+        self._mind = None if controller is None else Mind(controller)
+        self._power_max = power_max
+        self._emit = emit
+        self._power: float | None = None
+        self._surprises_k = (math.nan, math.nan)
+        self._tally = Tally()
+
+    @property
+    def name(self) -> str | None:
+        """The name of the controller in shadow, None without one."""
+        return None if self._mind is None else self._mind.name
+
+    @property
+    def power(self) -> float | None:
+        """What it would give, within the limit of power; None while it has no answer."""
+        return self._power
+
+    @property
+    def score(self) -> ShadowScore | None:
+        """How the two compare; None before the first minute."""
+        return self._tally.score
+
+    def exchanged(self, charge: Mind) -> Mind:
+        """Put `charge` into the shadow and return who stood there; the score begins anew."""
+        assert self._mind is not None
+        mind, self._mind = self._mind, charge
+        self._power, self._tally = None, Tally()
+        return mind
+
+    def observe(self, situation: Situation, charge: Mind) -> None:
+        """Show it the sample, before `charge` sees it; note how surprised both are."""
+        mind = self._mind
+        if mind is None:
+            return
+        of_charge = attempt(lambda: charge.surprise_k(situation))  # a score costs no heat
+        of_shadow = attempt(lambda: mind.surprise_k(situation))
+        seen = attempt(lambda: mind.observe(situation))
+        self._surprises_k = (_number(of_charge), _number(of_shadow))
+        if isinstance(of_shadow, Failure):
+            self._drop(of_shadow)
+        elif isinstance(seen, Failure):
+            self._drop(seen)
+
+    def decide(self, situation: Situation, given: float, seen_s: float, *, steered: bool) -> None:
+        """Ask it for the power of this sample, and compare that with what is given.
+
+        Parameters
+        ----------
+        situation : Situation
+            As the one in charge knows it.
+        given : float
+            Power of the command.
+        seen_s : float
+            Time that the sample stands for.
+        steered : bool
+            Whether the one in charge decided that power.
+        """
+        mind, self._power = self._mind, None
+        if mind is None:
+            return
+        if math.isfinite(situation.temperature_c):
+            asked = attempt(lambda: mind.decide(situation))
+            if isinstance(asked, Failure):
+                self._drop(asked)
+                return
+            if is_finite_number(asked):
+                self._power = clamp(float(asked), 0.0, self._power_max)  # type: ignore[arg-type]
+        known = self._power if steered else None
+        self._tally = self._tally.after(
+            None if known is None else Round(seen_s, given, known, *self._surprises_k)
+        )
+
+    def _drop(self, failure: Failure) -> None:
+        self._emit("shadow.failed", controller=self.name, text=failure.text, trace=failure.trace)
+        self._mind, self._power, self._tally = None, None, Tally()
+
+
+def _number(told: object) -> float:
+    """Return `told` as a number; NaN for what is none."""
+    return float(told) if is_finite_number(told) else math.nan  # type: ignore[arg-type]
