@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,16 +29,16 @@ R2_FLOOR = 1e-6
 PARALLEL = RecursiveLeastSquares(forgetting=0.95)
 NORMAL_SD = 1.4826
 """Standard deviation of a normal variable over the median of its magnitude."""
+_WITH_R2 = (CorrectedKalman, RandomWalkKalman)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Memory:
+class _Memory(NamedTuple):
     """What the guards remember: spread of the regressor, parallel least squares, residuals."""
 
     phi_mean: Array
     spread_squared: float
     parallel: Estimate
-    residuals: Array
+    residuals: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,7 +109,7 @@ class Guarded:
         if self.R2_min is not None:
             positive("R2_min", self.R2_min)
         truth("robust_R2", self.robust_R2)
-        if self.robust_R2 and not isinstance(self.law, RandomWalkKalman | CorrectedKalman):
+        if self.robust_R2 and not isinstance(self.law, _WITH_R2):
             raise ValueError(f"robust_R2 needs a law with R2, got {type(self.law).__name__}")
 
     def update(self, belief: Estimate, phi: Array, y: float) -> GuardedEstimate:
@@ -144,7 +145,7 @@ class Guarded:
 
     def _bounded(self, P: Array) -> Array:
         """Return P with no variance above `covariance_max` and its correlations kept."""
-        if self.covariance_max is None or not P.diagonal().max() > self.covariance_max:
+        if self.covariance_max is None or max(P.diagonal().tolist()) <= self.covariance_max:
             return P
         d = np.sqrt(self.covariance_max / np.maximum(P.diagonal(), self.covariance_max))
         return frozen(np.multiply.outer(d, d) * P)
@@ -154,11 +155,11 @@ class Guarded:
         law = self.law
         if not self.robust_R2 or memory is None or len(memory.residuals) < RESIDUALS_MIN:
             return law
-        assert isinstance(law, RandomWalkKalman | CorrectedKalman)
-        middle = len(memory.residuals) // 2
-        sd = NORMAL_SD * float(np.partition(memory.residuals, middle)[middle])
+        assert isinstance(law, _WITH_R2)
+        sd = NORMAL_SD * sorted(memory.residuals)[len(memory.residuals) // 2]
         least = R2_FLOOR * law.R2 if self.R2_min is None else self.R2_min
-        return replace(law, R2=clamp(max(sd * sd, least), 1.0 / LARGEST, LARGEST))
+        R2 = clamp(max(sd * sd, least), 1.0 / LARGEST, LARGEST)
+        return law if R2 == law.R2 else replace(law, R2=R2)
 
     def _remembered(self, before: GuardedEstimate, phi: Array, y: float) -> _Memory:
         """Return the memory after a usable sample."""
@@ -166,7 +167,7 @@ class Guarded:
         if memory is None:
             scale = getattr(self.law, "R2", 1.0)  # least squares counts in units of the noise
             parallel = Estimate(before.theta, frozen(before.P / scale))
-            memory = _Memory(np.array(phi, dtype=np.float64), 0.0, parallel, np.empty(0))
+            memory = _Memory(np.array(phi, dtype=np.float64), 0.0, parallel)
         share = 1.0 / EXCITATION_MEMORY
         step = phi - memory.phi_mean
         spread_squared = (1.0 - share) * (memory.spread_squared + share * float(step.dot(step)))
@@ -174,8 +175,10 @@ class Guarded:
         if self.robust_R2:
             parallel = PARALLEL.update(parallel, phi, y)
             newest = () if parallel.rejected else (abs(parallel.innovation),)
-            residuals = frozen(np.concatenate((newest, residuals[: RESIDUALS - 1])))
-        return _Memory(frozen(memory.phi_mean + share * step), spread_squared, parallel, residuals)
+            residuals = (*newest, *residuals[: RESIDUALS - 1])
+        step *= share
+        step += memory.phi_mean
+        return _Memory(frozen(step), spread_squared, parallel, residuals)
 
 
 def _adopted(belief: Estimate) -> GuardedEstimate:
