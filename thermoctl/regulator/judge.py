@@ -94,10 +94,12 @@ _CIRCUIT = {Quality.OPEN: Verdict.OPEN, Quality.SHORT: Verdict.SHORT}
 def _judge_step(memory: Judged, temperature_c: float, limits: Limits) -> Judged:
     if math.isnan(memory.last_good_c):
         return Judged(Verdict.GOOD, last_good_c=temperature_c)
-    widened_k = min(_STEP_FACTOR * memory.usual_step_k, _THRESHOLDS_MAX * limits.jump_k)
-    threshold_k = max(limits.jump_k, widened_k)
     step_k = abs(temperature_c - memory.last_good_c)
     steps_k = (*memory.steps_k[1 - _STEPS :], step_k)
+    if step_k <= limits.jump_k:  # nearly always, and no threshold is lower
+        return Judged(Verdict.GOOD, temperature_c, steps_k=steps_k)
+    widened_k = min(_STEP_FACTOR * memory.usual_step_k, _THRESHOLDS_MAX * limits.jump_k)
+    threshold_k = max(limits.jump_k, widened_k)
     repeated = (
         memory.outliers >= limits.OUTLIERS and abs(temperature_c - memory.suspect_c) <= threshold_k
     )

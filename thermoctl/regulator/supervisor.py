@@ -102,12 +102,12 @@ class Supervisor:
     def rule(self, t_s: float, ride_s: float) -> State:
         """Return the state after the last reading; the model may steer for `ride_s`."""
         verdict = self.verdict
-        if verdict in _TRIPS:
+        if verdict is Verdict.GOOD:
+            self._good()
+        elif verdict in _TRIPS:
             self._trip(verdict, t_s)
         elif verdict in _CIRCUITS:
             self._circuit(verdict, t_s)
-        elif verdict is Verdict.GOOD:
-            self._good()
         else:
             self._blind(t_s, ride_s if verdict is Verdict.MISSING else 0.0)
         return self.state
@@ -144,10 +144,11 @@ class Supervisor:
         self._tripping = None
         settled = self._good_s >= self.limits.RETURN_S
         self._tripped_lately = self._tripped_lately and not settled
-        for code in _SENSOR_CODES:
-            self.alarms.clear(code)
-        if self._blind_s == 0.0:
-            self.alarms.clear("sensor.missing")
+        if self.alarms.rows():
+            for code in _SENSOR_CODES:
+                self.alarms.clear(code)
+            if self._blind_s == 0.0:
+                self.alarms.clear("sensor.missing")
         if self.state in (State.RIDE, State.HOLD):
             self._enter(State.RUN, "sensor.good")
         elif self.state is State.SAFE and settled:
