@@ -98,11 +98,13 @@ def predicted(block: Block, heat: Array, sensor_step: Array, drift: Drift) -> Bl
     """Return the block one period later: T' = T - d + beta q, z' = z + a (T - z)."""
     after = block.copy()
     _move(after, heat, sensor_step)  # F [P | x]
-    columns = after.swapaxes(0, 1)
-    _move(columns[:X], heat, sensor_step)  # F P F'
+    moved = after[:D]
+    _move(moved.swapaxes(0, 1), heat, sensor_step)  # F P F' where both, row and column, move
+    after[D:, :D] = moved[:, D:X].swapaxes(0, 1)  # and by symmetry where one does
     after[Z, T] = after[T, Z]  # the one pair whose two ways of rounding differ
     b = np.maximum(block[BETA, X], drift.gain_min)
-    noise = drift.per_gain * (b * b)
+    b *= b
+    noise = drift.per_gain * b
     noise[Z] = drift.z
     diagonal = after.reshape(20, -1)[:19:6]  # elements (0, 0), (1, 1), (2, 2), (3, 3)
     diagonal += noise
@@ -111,12 +113,12 @@ def predicted(block: Block, heat: Array, sensor_step: Array, drift: Drift) -> Bl
 
 def _move(rows: Block, heat: Array, sensor_step: Array) -> None:
     """Multiply four rows by F from the left, in place; columns of P likewise by F'."""
-    water, sensor, loss, gain = rows
+    water, sensor = rows[T], rows[Z]
     towards = water - sensor
     towards *= sensor_step
     sensor += towards
-    water -= loss
-    water += gain * heat
+    water -= rows[D]
+    water += rows[BETA] * heat
 
 
 def inflated(block: Block, nu: float, R: float) -> Block:
@@ -136,9 +138,12 @@ def corrected(block: Block, y_c: float, R: float) -> tuple[Block, Array, Array]:
     """Return the block after reading `y_c`, the innovations and their variances."""
     S = block[Z, Z] + R
     nu = y_c - block[Z, X]
-    g = block[Z] / np.sqrt(S)  # P H' / sqrt S, and beside it:
-    np.divide(nu, -np.sqrt(S), out=g[X])
-    return block - g[:X, None] * g, nu, S  # P - g g', x + g nu / sqrt S
+    root = np.sqrt(S)
+    g = block[Z] / root  # P H' / sqrt S, and beside it:
+    np.divide(nu, -root, out=g[X])
+    after = g[:X, None] * g
+    np.subtract(block, after, out=after)  # P - g g', x + g nu / sqrt S
+    return after, nu, S
 
 
 def project(block: Block, hypotheses: Hypotheses, u_min: float, *, loss: bool) -> None:

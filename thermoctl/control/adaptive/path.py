@@ -44,7 +44,7 @@ def pushed(path: Path, hypotheses: Hypotheses, power: float) -> Path:
     powers = np.empty_like(path.powers)
     powers[0] = power
     powers[1:] = path.powers[:-1]
-    leaving = powers.take(hypotheses.dead)  # u[k-1-nd]
+    leaving = powers[hypotheses.dead]  # u[k-1-nd]
     pending = power - leaving
     pending += path.pending
     heat = leaving - path.heat
