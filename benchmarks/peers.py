@@ -27,7 +27,7 @@ import peer_filters
 from thermoctl.quantities import Array
 
 SIZES = (1, 2, 4)
-SAMPLES = 1000
+FEW, SAMPLES = 20, 1000
 T, R = 400, 1000
 AGREEMENT = 1e-9
 
@@ -131,8 +131,8 @@ def interleaved(works: Mapping[str, Work], rounds: int) -> dict[str, list[float]
     return {name: times[1:] for name, times in taken.items()}
 
 
-def apart(one: tuple[Array, Array], other: tuple[Array, Array]) -> float:
-    """Return how far two results lie apart, relative to the largest number in them."""
+def apart(one: tuple[Array, ...], other: tuple[Array, ...]) -> float:
+    """Return how far arrays lie apart at worst, relative to the largest number in each."""
     return max(
         float(np.abs(a - b).max() / np.abs(a).max()) for a, b in zip(one, other, strict=True)
     )
@@ -150,13 +150,16 @@ def present(makers: Mapping[str, Callable[[], Work]], absent: dict[str, str]) ->
 
 
 def online(rounds: int, absent: dict[str, str]) -> Iterator[Line]:
-    """Yield a line for each peer that learns from one sample at a time."""
+    """Yield a line for each peer that learns from one sample at a time.
+
+    They are compared after few samples, when the beginning still counts, and after all.
+    """
     for table, peers in peer_filters.PEERS.items():
         contenders = {"ours": peer_filters.OURS[table], **present(peers, absent)}
         for n in SIZES:
-            stream = peer_filters.Stream.of(n, SAMPLES)
+            few, stream = (peer_filters.Stream.of(n, samples) for samples in (FEW, SAMPLES))
             works = {name: partial(run, stream) for name, run in contenders.items()}
-            learned = {name: work() for name, work in works.items()}
+            learned = {name: (*run(few), *run(stream)) for name, run in contenders.items()}
             us = {
                 name: [1e6 * t / SAMPLES for t in times]
                 for name, times in interleaved(works, rounds).items()
