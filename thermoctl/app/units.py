@@ -10,6 +10,7 @@ from thermoctl.quantities import ZERO_CELSIUS_K, is_finite_number
 _UNITS: Final = {
     "k_per_s": "K/s",
     "per_s": "1/s",
+    "per_k": "1/K",
     "kelvin_per_v": "K/V",
     "c": "°C",
     "k": "K",

@@ -1,7 +1,7 @@
 """Controllers from elsewhere, tuned for the rig as it was ordered.
 
-simple-pid, a package with many users, with gains by the SIMC rules (S. Skogestad, Journal of
-Process Control 13 (2003) 291-309) from what is known of the nominal rig.
+simple-pid, a package with many users, with gains by the SIMC rules of `thermoctl.control.simc`
+from what is known of the nominal rig.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
+from thermoctl.control import simc as rules
 from thermoctl.errors import Unavailable
 from thermoctl.plant.parameters import WATER_J_PER_KG_K, TankParameters
 from thermoctl.ports import Situation
@@ -22,21 +23,10 @@ if TYPE_CHECKING:
     from simple_pid import PID
 
 
-@dataclass(frozen=True, slots=True)
-class Gains:
-    """Gains of a PID in its parallel form, power per kelvin: per K, per K s, s per K."""
-
-    Kp: float
-    Ki: float
-    Kd: float = 0.0
-
-
-def simc(tank: TankParameters, period_s: float = 1.0, *, derivative: bool = False) -> Gains:
+def simc(tank: TankParameters, period_s: float = 1.0, *, derivative: bool = False) -> rules.Gains:
     """Return the gains SIMC gives for a tank that is known as its maker knows it.
 
     The water integrates; element and sheath are lags; transport and half a sample are dead time.
-    The half rule turns the lags that the controller does not cancel into dead time, and the closed
-    loop is as quick as the dead time, which is what the rules recommend.
 
     Parameters
     ----------
@@ -48,16 +38,10 @@ def simc(tank: TankParameters, period_s: float = 1.0, *, derivative: bool = Fals
         Cancel the larger lag as well.
     """
     slope_k_per_s = tank.element.rated_w / (tank.vessel.water_kg * WATER_J_PER_KG_K)
-    larger_s, lesser_s = sorted((tank.element.lag_s, tank.probe.lag_s), reverse=True)
+    lags_s = sorted((tank.element.lag_s, tank.probe.lag_s), reverse=True)
     dead_s = tank.probe.transport_s + 0.5 * period_s
-    if not derivative:
-        dead_s += 0.5 * larger_s + lesser_s
-        Kp = 1.0 / (slope_k_per_s * 2.0 * dead_s)
-        return Gains(Kp, Kp / (8.0 * dead_s))
-    dead_s += 0.5 * lesser_s
-    Td_s, Ti_s = larger_s + 0.5 * lesser_s, 8.0 * dead_s
-    Kp = 1.0 / (slope_k_per_s * 2.0 * dead_s)
-    return Gains(Kp * (1.0 + Td_s / Ti_s), Kp / Ti_s, Kp * Td_s)  # from the series form
+    process = rules.Process(slope_k_per_s, dead_s, (math.inf, *lags_s))
+    return rules.simc(process, derivative=derivative)
 
 
 def _default(place: str) -> float:

@@ -1,0 +1,85 @@
+"""A test that is bounded in time, and what becomes of it.
+
+Implements section 6 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from thermoctl.control.relay import RelayRun, RelayTest
+from thermoctl.control.step_test import Found, GivenUp, StepRun, StepTest
+from thermoctl.ports import Situation
+
+FORGOTTEN_S, FORGOTTEN_PERIODS = 30.0, 5.0
+"""A test that somebody else steered through for longer than both is forgotten."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """How far tuning has come.
+
+    Parameters
+    ----------
+    run : StepRun or RelayRun or None
+        A test under way.
+    elapsed_s : float
+        Since it began.
+    idle_s : float
+        Since it last had its power.
+    outcome : Found or GivenUp or None
+        What it came to; there is no other test after that.
+    """
+
+    run: StepRun | RelayRun | None = None
+    elapsed_s: float = 0.0
+    idle_s: float = 0.0
+    outcome: Found | GivenUp | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AutoTune:
+    """Runs a test once, the first time it can begin.
+
+    Parameters
+    ----------
+    test : StepTest or RelayTest
+        The test.
+    most_s : float
+        How long it may last.
+    period_s : float
+        Time between two samples.
+    """
+
+    test: StepTest | RelayTest
+    most_s: float
+    period_s: float
+
+    def observe(self, tuning: Tuning, situation: Situation) -> Tuning:
+        """Return the tuning after this sample, whoever steers."""
+        if tuning.run is None:
+            return tuning
+        idle_s = tuning.idle_s + situation.interval_s
+        if idle_s > max(FORGOTTEN_S, FORGOTTEN_PERIODS * self.period_s):
+            return Tuning()
+        elapsed_s = tuning.elapsed_s + situation.interval_s
+        run = self.test.observe(tuning.run, situation)  # type: ignore[arg-type]
+        return Tuning(run, elapsed_s, idle_s)
+
+    def decide(self, tuning: Tuning, situation: Situation) -> tuple[Tuning, float | None]:
+        """Return the tuning and the power its test asks for; None: the law may steer."""
+        if tuning.outcome is not None:
+            return tuning, None
+        run = tuning.run
+        if run is None:
+            run = self.test.begin(situation)
+            if run is None:
+                return tuning, None
+            tuning = Tuning(run)
+        if tuning.elapsed_s > self.most_s:
+            return Tuning(outcome=GivenUp(f"not finished within {self.most_s:g} s")), None
+        told = self.test.decide(run, situation)  # type: ignore[arg-type]
+        if isinstance(told, Found | GivenUp):
+            return Tuning(outcome=told), None
+        after, power = told
+        return replace(tuning, run=after, idle_s=0.0), power

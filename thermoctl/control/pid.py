@@ -1,0 +1,204 @@
+"""A PID that can find its gains by itself.
+
+Implements section 6 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Literal
+
+from thermoctl.control.autotune import AutoTune, Tuning
+from thermoctl.control.pid_terms import PidTerms, Terms
+from thermoctl.control.relay import RelayTest
+from thermoctl.control.simc import Gains
+from thermoctl.control.step_test import Found, GivenUp, StepTest
+from thermoctl.ports import Situation
+from thermoctl.quantities import is_finite_number
+from thermoctl.signals import Beliefs
+
+
+@dataclass(frozen=True, slots=True)
+class PidBelief:
+    """What the controller remembers.
+
+    Parameters
+    ----------
+    terms : Terms
+        Of the law.
+    tuning : Tuning
+        How its gains came about, or will.
+    """
+
+    terms: Terms = field(default_factory=Terms)
+    tuning: Tuning = field(default_factory=Tuning)
+
+
+@dataclass(frozen=True, slots=True)
+class Pid:
+    r"""Proportional, integral and derivative of the error, with gains given or found.
+
+    .. math::
+
+        u = K \Bigl[ b r - y + \frac{1}{T_i} \int (r - y)\,dt \Bigr]
+            - K \frac{T_d s}{1 + s T_d/N} y
+
+    Its integral follows the power that was applied whenever somebody else steers, so it takes over
+    without a bump, and cannot wind up, whoever limits the power.
+
+    Parameters
+    ----------
+    gain_per_k : float
+        K, power per kelvin. Gains are used as they are when `tuning` is fixed; else before it has
+        come to an end, and after when it has failed, which the defaults are careful enough for.
+    integral_s : float
+        Ti.
+    derivative_s : float
+        Td; 0 is a PI.
+    derivative_filter : float
+        N: the derivative is filtered with Td/N; from 1 to 100.
+    setpoint_weight : float
+        b, from 0 to 1: the share of a step of the set point that meets the power at once.
+    tuning : str
+        ``fixed``: the gains as given. ``simc``: from the first warm-up of 3 K or more in mode auto.
+        ``relay``: from a swing about the set point.
+    tuned_form : str
+        What is tuned: ``pi``, or ``pid``, which is quicker and moves the power far more.
+    tuning_limit_s : float
+        How long a test may take; the gains stay as given when it has not ended by then.
+    relay_amplitude : float
+        How far the relay goes from its middle, .02 to .5 of full power. Its highest power has to
+        be well above the one that holds the set point, and begins at twice this.
+    period_s : float
+        Time between two samples, as the loop has it.
+
+    Raises
+    ------
+    ValueError
+        An argument is outside its range.
+    """
+
+    gain_per_k: float = 0.1
+    integral_s: float = 600.0
+    derivative_s: float = 0.0
+    derivative_filter: float = 10.0
+    setpoint_weight: float = 0.7
+    tuning: Literal["fixed", "simc", "relay"] = "simc"
+    tuned_form: Literal["pi", "pid"] = "pi"
+    tuning_limit_s: float = 14400.0
+    relay_amplitude: float = 0.25
+    period_s: float = 1.0
+    autotune: AutoTune | None = field(init=False, repr=False, compare=False)
+
+    name: ClassVar[str] = "pid"
+
+    def __post_init__(self) -> None:
+        for name in ("gain_per_k", "integral_s", "tuning_limit_s", "period_s"):
+            value = getattr(self, name)
+            if not is_finite_number(value) or not value > 0.0:
+                raise ValueError(f"{name} must be positive, got {value!r}")
+        if not is_finite_number(self.derivative_s) or self.derivative_s < 0.0:
+            raise ValueError(f"derivative_s must be at least 0, got {self.derivative_s!r}")
+        ranges = {
+            "derivative_filter": (1.0, 100.0),
+            "setpoint_weight": (0.0, 1.0),
+            "relay_amplitude": (0.02, 0.5),
+        }
+        for name, (low, high) in ranges.items():
+            value = getattr(self, name)
+            if not is_finite_number(value) or not low <= value <= high:
+                raise ValueError(f"{name} must lie in [{low:g}, {high:g}], got {value!r}")
+        if self.tuning not in ("fixed", "simc", "relay"):
+            raise ValueError(f"tuning must be 'fixed', 'simc' or 'relay', got {self.tuning!r}")
+        if self.tuned_form not in ("pi", "pid"):
+            raise ValueError(f"tuned_form must be 'pi' or 'pid', got {self.tuned_form!r}")
+        object.__setattr__(self, "autotune", self._autotune())
+
+    def _autotune(self) -> AutoTune | None:
+        """Return what finds the gains, None where they are fixed."""
+        if self.tuning == "fixed":
+            return None
+        derivative = self.tuned_form == "pid"
+        test: StepTest | RelayTest = RelayTest(derivative, self.relay_amplitude)
+        if self.tuning == "simc":
+            test = StepTest(derivative, self.period_s)
+        return AutoTune(test, self.tuning_limit_s, self.period_s)
+
+    def start(self) -> PidBelief:
+        """Return the belief before the first sample."""
+        return PidBelief()
+
+    def observe(self, belief: PidBelief, situation: Situation) -> PidBelief:
+        """Return the belief after this sample, whoever steered up to it."""
+        tuning, law = belief.tuning, self._law(belief)
+        if self.autotune is not None:
+            tuning = self.autotune.observe(tuning, situation)
+        before, interval_s = belief.terms, situation.interval_s
+        terms = law.see(before, situation.temperature_c, interval_s)
+        terms = replace(terms, asked=math.nan)
+        first = math.isnan(before.seen_c)
+        if first or not (math.isfinite(terms.seen_c) and math.isfinite(situation.setpoint_c)):
+            return PidBelief(terms, tuning)
+        in_charge = math.isfinite(before.asked) and interval_s < law.gains.integral_s
+        if in_charge:
+            terms = replace(terms, asked=before.asked)
+            terms = law.integrate(terms, situation.setpoint_c, situation.applied, interval_s)
+            terms = replace(terms, asked=math.nan)
+        else:
+            terms = law.track(terms, situation.setpoint_c, situation.applied)
+        return PidBelief(terms, tuning)
+
+    def decide(self, belief: PidBelief, situation: Situation) -> tuple[PidBelief, float]:
+        """Return the power of the law or of its test, not bounded; NaN when not known."""
+        temperature_c, setpoint_c = situation.temperature_c, situation.setpoint_c
+        terms, tuning = belief.terms, belief.tuning
+        if not (math.isfinite(temperature_c) and math.isfinite(setpoint_c)):
+            return belief, math.nan
+        if self.autotune is not None:
+            tuning, power = self.autotune.decide(tuning, situation)
+            if power is not None:
+                return PidBelief(terms, tuning), power
+        law = self._law(PidBelief(terms, tuning))
+        if math.isnan(terms.integral) or tuning.outcome is not belief.tuning.outcome:
+            holding = tuning.outcome.holding_power if isinstance(tuning.outcome, Found) else 0.0
+            terms = law.at_rest(terms, setpoint_c, holding)
+        power = law.power(terms, setpoint_c)
+        return PidBelief(replace(terms, asked=power), tuning), power
+
+    def gains(self, belief: PidBelief) -> Gains:
+        """Return the gains in force."""
+        outcome = belief.tuning.outcome
+        if isinstance(outcome, Found):
+            return outcome.gains
+        return Gains(self.gain_per_k, self.integral_s, self.derivative_s)
+
+    def _law(self, belief: PidBelief) -> PidTerms:
+        return PidTerms(self.gains(belief), self.setpoint_weight, self.derivative_filter)
+
+    def beliefs(self, belief: PidBelief, situation: Situation) -> Beliefs:
+        """Return the gain of the plant, once it was found."""
+        outcome = belief.tuning.outcome
+        return Beliefs(outcome.slope_k_per_s) if isinstance(outcome, Found) else Beliefs()
+
+    def ride_s(self, belief: PidBelief) -> float:
+        """Return 0: it has no model to steer by without a sensor."""
+        return 0.0
+
+    def remarks(self, belief: PidBelief) -> Mapping[str, str]:
+        """Return that a test is under way, or what it has come to."""
+        tuning = belief.tuning
+        if isinstance(tuning.outcome, Found):
+            return {"controller.tuned": f"{_in_words(self.gains(belief))}: {tuning.outcome.text}"}
+        if isinstance(tuning.outcome, GivenUp):
+            text = f"{tuning.outcome.text}; {_in_words(self.gains(belief))} as given"
+            return {"controller.tuning_failed": text}
+        if tuning.run is not None:
+            return {"controller.tuning": f"{self.tuning}, at most {self.tuning_limit_s:g} s"}
+        return {}
+
+
+def _in_words(gains: Gains) -> str:
+    words = f"gain {gains.gain_per_k:.3g} per K, integral {gains.integral_s:.3g} s"
+    return f"{words}, derivative {gains.derivative_s:.3g} s" if gains.derivative_s else words

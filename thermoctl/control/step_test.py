@@ -1,0 +1,137 @@
+"""The warm-up as the step from which a plant is learnt.
+
+Implements section 6 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from thermoctl.control.simc import Gains, Process, simc
+from thermoctl.control.step_fit import StepFit, step_fit
+from thermoctl.control.stretch import Piece, Stretch
+from thermoctl.ports import Situation
+
+BEGIN_BELOW_K = 3.0
+"""A warm-up shorter than this is none to learn from."""
+SHARE = 0.5
+"""The power is on for at most this share of the way to the set point."""
+RISE_MIN_K = 1.0
+LAGS_RISING, LAGS_COASTING = 6.0, 4.0
+"""So many lags have to be in sight, while power is on and after."""
+FIRST_LOOK_PERIODS = 10.0
+NEXT_LOOK = 1.2
+COAST_S, COAST_SHARE = 120.0, 2.0
+"""Without power a test lasts at most so long, and so many times as long as with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a test has come to.
+
+    Parameters
+    ----------
+    gains : Gains
+        The gains to steer with from now on.
+    text : str
+        What they were taken from.
+    slope_k_per_s : float
+        Rise at full power.
+    holding_power : float
+        Power to go on with where there is no error; 0 where that was not seen.
+    """
+
+    gains: Gains
+    text: str
+    slope_k_per_s: float
+    holding_power: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class GivenUp:
+    """A test that came to nothing, and why."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class StepRun:
+    """A step test under way.
+
+    Parameters
+    ----------
+    begun_c : float
+        Where it began.
+    stretch : Stretch
+        What was seen since.
+    look_s : float
+        When to fit next.
+    risen_s : float
+        How long the power was on; NaN while it still is.
+    """
+
+    begun_c: float
+    stretch: Stretch
+    look_s: float
+    risen_s: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class StepTest:
+    """Full power for a part of the way up, then SIMC for what the rise shows.
+
+    The test ends as soon as the rise tells lag and slope. Where half the way is too short for that,
+    the power goes off and the coasting tells.
+
+    Parameters
+    ----------
+    derivative : bool
+        Whether the gains are to be those of a PID.
+    period_s : float
+        Time between two samples.
+    """
+
+    derivative: bool
+    period_s: float
+
+    def begin(self, situation: Situation) -> StepRun | None:
+        """Return the test, begun at this sample; None where there is no way to go up."""
+        below_k = situation.setpoint_c - situation.temperature_c
+        if not below_k >= BEGIN_BELOW_K:
+            return None
+        return StepRun(situation.temperature_c, Stretch(), FIRST_LOOK_PERIODS * self.period_s)
+
+    def observe(self, run: StepRun, situation: Situation) -> StepRun:
+        """Return the test after one more sample, whoever steered."""
+        piece = Piece(situation.interval_s, situation.applied, situation.measured_c)
+        return replace(run, stretch=run.stretch.after(piece))
+
+    def decide(self, run: StepRun, situation: Situation) -> tuple[StepRun, float] | Found | GivenUp:
+        """Return the test and the power it asks for, or what it has come to."""
+        seen_s = run.stretch.length_s
+        rise_k = situation.temperature_c - run.begun_c
+        rising = math.isnan(run.risen_s)
+        if rising and rise_k >= SHARE * (situation.setpoint_c - run.begun_c):
+            run, rising = replace(run, risen_s=seen_s, look_s=seen_s), False
+        if seen_s >= run.look_s and rise_k >= RISE_MIN_K:
+            fit = step_fit(run.stretch)
+            if fit is not None and self._tells(fit, seen_s, rising):
+                return self._found(fit)
+            run = replace(run, look_s=max(NEXT_LOOK * seen_s, seen_s + self.period_s))
+        if not rising and seen_s - run.risen_s > COAST_S + COAST_SHARE * run.risen_s:
+            return GivenUp(f"the lag did not show within {seen_s:.0f} s")
+        return run, 1.0 if rising else 0.0
+
+    def _tells(self, fit: StepFit, seen_s: float, rising: bool) -> bool:
+        """Return whether enough was seen for `fit` to be true."""
+        lags = LAGS_RISING if rising else LAGS_COASTING
+        return not fit.longest and seen_s >= lags * fit.total_s
+
+    def _found(self, fit: StepFit) -> Found:
+        """Return the gains for a plant, to which sampling adds half a period of dead time."""
+        slope, (_, lag_s) = fit.process.slope_k_per_s, fit.process.lags_s
+        dead_s = fit.process.dead_s + 0.5 * self.period_s
+        gains = simc(Process(slope, dead_s, (math.inf, lag_s)), derivative=self.derivative)
+        text = f"{slope:.3g} K/s at full power, dead time {dead_s:.3g} s, lag {lag_s:.3g} s"
+        return Found(gains, text, slope)
