@@ -23,6 +23,7 @@ from thermoctl.estimation import (
 from thermoctl.model.arx import Arx
 from thermoctl.ports import Estimator
 from thermoctl.signals import Estimate
+from thermoctl.studies.scaled import MOST_R2
 
 EXAMPLES = "ckf, nkf, nkf:R1=1e-6, rls, rls:0.98, vff, vff:10"
 
@@ -194,7 +195,8 @@ def parse_law(text: str) -> LawSpec:
             raise ValueError(f"{text!r}: expected a number for {key}, got {value!r}") from None
     spec = LawSpec(text.strip(), name.lower(), constants)
     try:
-        kind.build(constants, 1.0)
+        for R2 in (1.0, 1.0 / MOST_R2, MOST_R2):
+            kind.build(constants, R2)
     except ValueError as problem:
         raise ValueError(f"{text!r}: {problem}") from problem
     return spec

@@ -19,7 +19,7 @@ from thermoctl.estimation import LainiotisBank, Order
 from thermoctl.estimation.belief import frozen
 from thermoctl.quantities import Array
 from thermoctl.studies.record import Record
-from thermoctl.studies.scaled import Scaling
+from thermoctl.studies.scaled import Scaling, check_P0, check_R2
 from thermoctl.studies.wide import WideModel, fit_wide
 
 DELAYS = (1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25)
@@ -157,21 +157,23 @@ def weigh(
     Raises
     ------
     RecordError
-        If the output never changes, or too few samples have a whole past.
+        If the output never changes, or too few samples have a whole past; if `R2` or `P0` is
+        out of what `check_R2` and `check_P0` let pass.
     ValueError
-        If the candidates are none, repeat each other, or `R2` or `P0` is not positive.
+        If the candidates are none or repeat each other.
     """
+    check_P0(P0)
     scaling = Scaling.of(record, keep_mean=keep_mean)
     y, u = scaling.outputs(record), scaling.inputs(record)
     unit = scaling.y_scale**2
-    bank = LainiotisBank(candidates, R=1.0 if R2 is None else R2 / unit, P0=P0, floor=0.0)
-    orders = tuple(bank.candidates)
+    orders = tuple(LainiotisBank(candidates, floor=0.0).candidates)
     structures = [order.structure() for order in orders]
     reach = max(each.u_memory for each in structures)
     wide = fit_wide(record, y, u, max(order.n for order in orders), reach)
     if R2 is None:
         R2 = wide.R2 * unit
-        bank = LainiotisBank(orders, R=wide.R2, P0=P0, floor=0.0)
+    check_R2(R2, unit)
+    bank = LainiotisBank(orders, R=R2 / unit, P0=P0, floor=0.0)
     if not keep_mean:  # with these centres no candidate lacks a constant
         scaling = replace(scaling, u_centre=scaling.u_centre + wide.rest * scaling.u_scale)
         u = scaling.inputs(record)

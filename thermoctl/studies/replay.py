@@ -21,7 +21,7 @@ from thermoctl.quantities import Array
 from thermoctl.studies.laws import LawSpec, prepare
 from thermoctl.studies.orders import Weighing
 from thermoctl.studies.record import Record, RecordError
-from thermoctl.studies.scaled import Scaled, Scaling, robust_variance
+from thermoctl.studies.scaled import Scaled, Scaling, check_P0, check_R2, robust_variance
 from thermoctl.studies.whiteness import FEWEST_SAMPLES, ljung_box
 
 NOISE_FORGETTING = 0.95
@@ -180,13 +180,10 @@ def replay(
     Raises
     ------
     RecordError
-        If the output never changes, or too few samples have a whole past.
-    ValueError
-        If `R2` or `P0` is not positive and finite.
+        If the output never changes, or too few samples have a whole past; if `R2` or `P0` is
+        out of what `check_R2` and `check_P0` let pass.
     """
-    for name, value in (("R2", R2), ("P0", P0)):
-        if value is not None and not 0.0 < value < math.inf:
-            raise ValueError(f"{name} must be positive and finite, got {value!r}")
+    check_P0(P0)
     weighing = order if isinstance(order, Weighing) else None
     structure = order.best.structure() if isinstance(order, Weighing) else order
     scaling = weighing.scaling if weighing else Scaling.of(record, keep_mean=keep_mean)
@@ -198,6 +195,7 @@ def replay(
         source = f"estimated: robust spread of the errors of a first pass, RLS({NOISE_FORGETTING})"
     else:
         source = "given"
+    check_R2(R2, conditions.y_scale**2)
     conditions = replace(conditions, R2=R2, R2_source=source)
     runs = [_run(scaled, conditions, law, timer) for law in laws]
     scores, traces = zip(*runs, strict=True)

@@ -12,6 +12,12 @@ from thermoctl.model.arx import Arx
 from thermoctl.quantities import Array
 from thermoctl.studies.record import LARGEST, Record, RecordError
 
+MOST_P0 = 1e9
+"""Largest P0, in the scaled variables; the least is its inverse."""
+
+MOST_R2 = 1e40
+"""Largest R2, in the scaled variables; the least is its inverse."""
+
 _MAD = 1.4826
 _BLOCK = 4_096
 
@@ -90,6 +96,18 @@ class Scaled:
         """Yield index, regressor and output of every sample with a whole past."""
         for block, phi in self.blocks():
             yield from zip(block.tolist(), phi, self.y[block].tolist(), strict=True)
+
+
+def check_P0(P0: float) -> None:  # noqa: N802 - P0 keeps its letter
+    """Raise `RecordError` unless P0 lies within `MOST_P0` and its inverse."""
+    if not 1.0 / MOST_P0 <= P0 <= MOST_P0:
+        raise RecordError(f"expected P0 from {1.0 / MOST_P0:g} to {MOST_P0:g}, got {P0:g}")
+
+
+def check_R2(R2: float, unit: float) -> None:  # noqa: N802 - R2 keeps its letter
+    """Raise `RecordError` unless R2 over `unit` lies within `MOST_R2` and its inverse."""
+    if not unit / MOST_R2 <= R2 <= unit * MOST_R2:
+        raise RecordError(f"expected R2 from {unit / MOST_R2:g} to {unit * MOST_R2:g}, got {R2:g}")
 
 
 def moves(values: Array) -> bool:

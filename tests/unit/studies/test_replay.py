@@ -1,11 +1,15 @@
 import itertools
+import math
+import re
 
 import numpy as np
 import pytest
 
+from thermoctl.estimation import Order
 from thermoctl.model.arx import Arx
 from thermoctl.studies import replay as replay_module
 from thermoctl.studies.laws import parse_law
+from thermoctl.studies.orders import weigh
 from thermoctl.studies.record import Columns, Record, RecordError
 from thermoctl.studies.replay import FEWEST_SCORED, TRACE_LENGTH, replay
 from thermoctl.studies.scaled import Scaled
@@ -190,10 +194,20 @@ def test_a_record_that_is_too_short_is_refused_with_the_numbers():
         replay(recorded(samples=10), ORDER, [KALMAN])
 
 
-@pytest.mark.parametrize("wrong", [{"R2": 0.0}, {"R2": float("nan")}, {"P0": -1.0}])
-def test_variances_must_be_positive(wrong):
-    with pytest.raises(ValueError, match=next(iter(wrong))):
-        replay(recorded(samples=100), ORDER, [KALMAN], **wrong)
+@pytest.mark.parametrize("name", ["R2", "P0"])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf, 1e60, 1e-60])
+def test_variances_must_be_such_that_a_law_can_use_them(name, value):
+    message = f"expected {name} from .*, got {re.escape(format(value, 'g'))}"
+    with pytest.raises(RecordError, match=message):
+        replay(recorded(samples=100), ORDER, [KALMAN], **{name: value})
+    with pytest.raises(RecordError, match=message):
+        weigh(recorded(samples=100), [Order(1, 1, 1)], **{name: value})
+
+
+@pytest.mark.parametrize("law", ["rls:1e-9", "nkf:R1=1e49", "ckf", "vff:1e9", "vff:1e-9"])
+@pytest.mark.parametrize("given", [{"R2": 1e38}, {"R2": 1e-38}, {"P0": 1e9}, {"P0": 1e-9}])
+def test_variances_at_their_limits_are_lived_with(law, given):
+    assert replay(recorded(samples=100), ORDER, [parse_law(law)], **given).scores[0].name == law
 
 
 @pytest.mark.parametrize("unit_y", [1e-200, 1e-160])
