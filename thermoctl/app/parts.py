@@ -130,6 +130,7 @@ def _limits(table: LoopTable) -> Limits:
         power_max=table.power_max,
         rise_per_s=table.rise_limit_per_s,
         jump_k=table.jump_k if "jump_k" in table.model_fields_set else _jump_k(table),
+        jump_widens="jump_k" not in table.model_fields_set,
     )
 
 

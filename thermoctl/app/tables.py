@@ -187,7 +187,8 @@ class LoopTable(Table):
     jump_k: Positive = Field(
         1.0,
         description="A reading farther off than this may be an outlier; left out, it is at least "
-        "twice the rise in a period at full power.",
+        "twice the rise in a period at full power, with the gain that is configured or the largest "
+        "that the controller believes in.",
     )
     sensor: SensorTable | None = None
     actuator: ActuatorTable | None = None

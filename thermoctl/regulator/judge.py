@@ -64,8 +64,12 @@ class Judged:
         return sorted(self.steps_k)[len(self.steps_k) // 4] if self.steps_k else 0.0
 
 
-def judge(memory: Judged, measurement: Measurement, limits: Limits) -> Judged:
+def judge(
+    memory: Judged, measurement: Measurement, limits: Limits, jump_k: float | None = None
+) -> Judged:
     """Return the verdict on `measurement`, with the memory for the next one.
+
+    `jump_k` is the jump that the plant could make, that of `limits` when not given.
 
     An outlier is believed when it repeats: after two in a row, a third that agrees with the one
     before it means that the water has jumped, as it does when a jug of cold water goes in.
@@ -82,7 +86,7 @@ def judge(memory: Judged, measurement: Measurement, limits: Limits) -> Judged:
         return replace(memory, verdict=Verdict.OVER)
     if quality is not Quality.GOOD:
         return replace(memory, verdict=Verdict.MISSING)
-    judged = _judge_step(memory, temperature_c, limits)
+    judged = _judge_step(memory, temperature_c, limits, limits.jump_k if jump_k is None else jump_k)
     if judged.verdict is Verdict.GOOD and temperature_c < limits.trip_below_c:
         return replace(judged, verdict=Verdict.UNDER)
     return judged
@@ -91,7 +95,7 @@ def judge(memory: Judged, measurement: Measurement, limits: Limits) -> Judged:
 _CIRCUIT = {Quality.OPEN: Verdict.OPEN, Quality.SHORT: Verdict.SHORT}
 
 
-def _judge_step(memory: Judged, temperature_c: float, limits: Limits) -> Judged:
+def _judge_step(memory: Judged, temperature_c: float, limits: Limits, jump_k: float) -> Judged:
     if math.isnan(memory.last_good_c):
         return Judged(Verdict.GOOD, last_good_c=temperature_c)
     step_k = abs(temperature_c - memory.last_good_c)
@@ -99,7 +103,7 @@ def _judge_step(memory: Judged, temperature_c: float, limits: Limits) -> Judged:
     if step_k <= limits.jump_k:  # nearly always, and no threshold is lower
         return Judged(Verdict.GOOD, temperature_c, steps_k=steps_k)
     widened_k = min(_STEP_FACTOR * memory.usual_step_k, _THRESHOLDS_MAX * limits.jump_k)
-    threshold_k = max(limits.jump_k, widened_k)
+    threshold_k = max(jump_k, widened_k)
     repeated = (
         memory.outliers >= limits.OUTLIERS and abs(temperature_c - memory.suspect_c) <= threshold_k
     )

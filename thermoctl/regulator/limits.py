@@ -8,6 +8,8 @@ from dataclasses import dataclass, fields
 from thermoctl.errors import Refused
 from thermoctl.quantities import is_finite_number
 
+_NO_FINITE_NUMBER = ("rise_per_s", "jump_widens")
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -30,6 +32,8 @@ class Limits:
         readings as well, is an outlier.
     applied_tolerance : float
         The hardware may take this much more than it was told before it counts as a fault.
+    jump_widens : bool
+        Whether a reading may also lie as far off as the gain that is believed in explains.
     """
 
     trip_above_c: float
@@ -41,6 +45,7 @@ class Limits:
     rise_per_s: float = math.inf
     jump_k: float = 1.0
     applied_tolerance: float = 0.1
+    jump_widens: bool = True
 
     HOLD_S = 3.0
     """HOLD keeps the last output no longer than this."""
@@ -52,13 +57,17 @@ class Limits:
     OPEN_COUNT = 3
     OPEN_WINDOW_S = 600.0
     """So many open circuits within this time latch."""
+    STEEPEST_K_PER_S = 0.5
+    """No gain beyond this widens the jump: 1,500 W heat .7 l of water so fast."""
+    WIDEST_K = 10.0
+    """Nor does any, over however long a period, to more than this: half of a plain spike."""
     OUTLIERS = 2
     """So many outliers in a row are ignored; the next one that agrees with them is the truth."""
 
     def __post_init__(self) -> None:
         for each in fields(self):
             value = getattr(self, each.name)
-            if each.name != "rise_per_s" and not is_finite_number(value):
+            if each.name not in _NO_FINITE_NUMBER and not is_finite_number(value):
                 raise ValueError(f"{each.name} must be a finite number, got {value!r}")
         if not self.trip_below_c <= self.setpoint_min_c <= self.setpoint_max_c <= self.trip_above_c:
             raise ValueError(
@@ -88,6 +97,22 @@ class Limits:
     def seen_s(self, interval_s: float) -> float:
         """Return how much of the time since the last sample a good reading answers for."""
         return min(interval_s, self.hold_s)
+
+    def jump_for(self, gain: float, gain_sd: float) -> float:
+        """Return `jump_k`, or what a plant of the largest gain that is believed in may do.
+
+        That is twice its rise in a period at full power, as long as the gain is two standard
+        deviations above its mean. A plant never seen before is thus given its way, while one that
+        is known narrows the jump again.
+
+        Parameters
+        ----------
+        gain, gain_sd : float
+            Rise at full power and its standard deviation, in K/s; NaN where nothing is believed.
+        """
+        largest = min(abs(gain) + 2.0 * gain_sd, self.STEEPEST_K_PER_S)
+        explained_k = min(2.0 * largest * self.period_s, self.WIDEST_K)
+        return explained_k if self.jump_widens and explained_k > self.jump_k else self.jump_k
 
     def valid_until_s(self, t_s: float) -> float:
         """Return when a command of `t_s` expires: half a period late, and a second."""

@@ -107,6 +107,7 @@ class Regulator:
         self._identified: IdentifierBelief = plan.identifier.start()
         self._foreseen: IdentifierBelief | None = None
         self._holding = Holding()
+        self._jump_k = plan.limits.jump_k
         self._t_s: float | None = None
         self._manual_power = 0.0
         self._command = Command(0.0, -math.inf, "start")
@@ -187,7 +188,7 @@ class Regulator:
         """Return what is made of `measurement`; never raises, whatever it holds."""
         t_s, interval_s = self._time(measurement.t_s)
         applied = self._applied_power()
-        verdict = self._supervisor.judge(measurement, t_s, interval_s)
+        verdict = self._supervisor.judge(measurement, t_s, interval_s, self._jump_k)
         temperature_c = float(measurement.temperature_c) if verdict is Verdict.GOOD else math.nan
         self._identify(temperature_c, self._given(applied, interval_s), t_s)
         seen_s = self._limits.seen_s(interval_s)
@@ -197,6 +198,7 @@ class Regulator:
         self._steering.observe(situation)
         known = self._guard.call(self._model_beliefs, Beliefs(), "estimator.failed", t_s)
         beliefs = self._steering.beliefs(situation, known)
+        self._jump_k = self._jump_for(beliefs)
         state = self._supervisor.rule(t_s, self._ride_s(situation, beliefs))
         asked, reason = self._ask(situation, state, beliefs)
         self._steering.tell_remarks(t_s)
@@ -301,6 +303,14 @@ class Regulator:
         estimate = self._identified.estimate
         a, a_sd = self._plan.identifier.structure.pole(estimate.theta, estimate.P)
         return Beliefs(a=a, a_sd=a_sd, holding_power=self._holding.known)
+
+    def _jump_for(self, beliefs: Beliefs) -> float:
+        """Return how far the next reading may lie off before it is an outlier."""
+        gain, gain_sd = beliefs.gain, beliefs.gain_sd
+        if not is_finite_number(gain):
+            return self._limits.jump_k
+        sd = float(gain_sd) if is_finite_number(gain_sd) else 0.0  # type: ignore[arg-type]
+        return self._limits.jump_for(float(gain), sd)  # type: ignore[arg-type]
 
     def _ride_s(self, situation: Situation, beliefs: Beliefs) -> float:
         """Return how long the model may steer without a sensor: 0 until it is known."""

@@ -77,10 +77,15 @@ class Supervisor:
 
     # -- judging ---------------------------------------------------------------------------------
 
-    def judge(self, measurement: Measurement, t_s: float, interval_s: float) -> Verdict:
-        """Return what `measurement`, `interval_s` after the last, is worth."""
+    def judge(
+        self, measurement: Measurement, t_s: float, interval_s: float, jump_k: float | None = None
+    ) -> Verdict:
+        """Return what `measurement`, `interval_s` after the last, is worth.
+
+        `jump_k` is the jump that the plant could make, that of the limits when not given.
+        """
         before = self._judged.verdict
-        self._judged = judge(self._judged, measurement, self.limits)
+        self._judged = judge(self._judged, measurement, self.limits, jump_k)
         self._reading = measurement.temperature_c
         self._interval_s = interval_s
         verdict = self._judged.verdict
