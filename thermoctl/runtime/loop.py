@@ -22,6 +22,7 @@ from thermoctl.ports import Clock, Simulated
 from thermoctl.quantities import is_finite_number
 from thermoctl.regulator import Regulator
 from thermoctl.regulator.limits import command_lasts_s
+from thermoctl.runtime.asked import Asked
 from thermoctl.runtime.connection import Connection
 from thermoctl.signals import Cycle, Event, Measurement, Quality, RawSample, Request, Step
 
@@ -82,7 +83,8 @@ class Loop:
         )
         self._clock, self._period_s = clock, period_s
         self._publish, self._completed = publish, completed
-        self._requests: queue.SimpleQueue[tuple[str | None, Request]] = queue.SimpleQueue()
+        self._requests: queue.SimpleQueue[Asked] = queue.SimpleQueue()
+        self._claimed: list[Asked] = []
         self._events: deque[tuple[str, Mapping[str, object]]] = deque(maxlen=_EVENTS)
         self._silent: set[str] = set()
         self._sound = True
@@ -93,9 +95,14 @@ class Loop:
 
     # -- from other threads ----------------------------------------------------------------------
 
-    def ask(self, request: Request, loop: str | None = None) -> None:
-        """Put a request into the queue that is read at the top of the next cycle."""
-        self._requests.put((loop, request))
+    def ask(self, request: Request, loop: str | None = None) -> Asked:
+        """Put a request into the queue that is read at the top of the next cycle.
+
+        What is returned is settled once that cycle is published, for whoever wants the answer.
+        """
+        asked = Asked(request, loop)
+        self._requests.put(asked)
+        return asked
 
     def stop(self) -> None:
         """End `run` after the cycle that is under way; a signal handler may call it."""
@@ -139,6 +146,7 @@ class Loop:
             self._all_off()
             self._fail(self.wirings, "cycle.failed", error)
             self._stand_in()
+        self._settle()
         if self._sound:
             self.cycles += 1
             self._failure = ""
@@ -320,15 +328,30 @@ class Loop:
 
     def _grant_requests(self) -> None:
         for _ in range(self._requests.qsize()):  # what comes meanwhile waits for the next cycle
-            loop, request = self._requests.get_nowait()
-            asked = [wiring for wiring in self.wirings if loop in (None, wiring.name)]
-            if not asked:
-                self.report("request.refused", loop=loop, why=f"there is no loop {loop!r}")
-            for wiring in asked:
-                try:
-                    wiring.regulator.request(request)
-                except Refused as refusal:
-                    self.report("request.refused", loop=wiring.name, why=str(refusal))
+            asked = self._requests.get_nowait()
+            if asked.claim():
+                self._claimed.append(asked)
+                asked.decide(self._grant(asked))
+
+    def _grant(self, asked: Asked) -> str | None:
+        """Hand a request to the loops it is meant for; return the refusal, if any."""
+        meant = [each for each in self.wirings if asked.loop in (None, each.name)]
+        refusal = None if meant else f"there is no loop {asked.loop!r}"
+        if not meant:
+            self.report("request.refused", loop=asked.loop, why=refusal)
+        for wiring in meant:
+            try:
+                wiring.regulator.request(asked.request)
+            except Refused as refused:
+                refusal = str(refused)
+                self.report("request.refused", loop=wiring.name, why=refusal)
+        return refusal
+
+    def _settle(self) -> None:
+        """Answer what this cycle took from the queue, now that everybody can see the outcome."""
+        for asked in self._claimed:
+            asked.settle()
+        self._claimed.clear()
 
     def take_events(self) -> tuple[Event, ...]:
         """Return what was reported since the last cycle was published."""
