@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from contextlib import redirect_stdout
 
-from thermoctl.app.report import as_line
+from thermoctl.app.cycle_record import as_line
 from thermoctl.app.sim import bench_settings, profile, simulate
 
 RUNS = 5

@@ -23,10 +23,11 @@ import click
 
 from thermoctl import __version__
 from thermoctl.app.compose import loop_for
+from thermoctl.app.cycle_record import as_line
 from thermoctl.app.live import Action, Desk, Facts, Keys, LiveModel, LiveScreen, look_for
 from thermoctl.app.live.desk import DISTURBANCES
 from thermoctl.app.live.look import printable
-from thermoctl.app.report import Summary, as_line, closing_lines
+from thermoctl.app.report import Summary, closing_lines
 from thermoctl.app.settings import Settings
 from thermoctl.errors import Refused
 from thermoctl.ports import Simulated

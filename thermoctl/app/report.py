@@ -1,61 +1,19 @@
-"""A cycle as one line of JSON, and a run as one summary."""
+"""A run as one summary, and as the lines a person reads when it has ended."""
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
+from thermoctl.app.cycle_record import finite
 from thermoctl.app.live import numbers
-from thermoctl.signals import Cycle, Estimate
+from thermoctl.signals import Cycle
 from thermoctl.studies.words import duration
 
 SETTLED_K = 0.1
 SETTLED_FOR_S = 60.0
-
-
-def finite(value: float | None) -> float | None:
-    """Return `value`, None where it is not known; no NaN ever leaves the program."""
-    return None if value is None or not math.isfinite(value) else value
-
-
-def as_line(cycle: Cycle, beside: Mapping[str, Any] = MappingProxyType({})) -> str:
-    """Return the cycle, and keys found beside it, as one JSON object."""
-    return json.dumps({**cycle_record(cycle), **beside}, allow_nan=False)
-
-
-def cycle_record(cycle: Cycle) -> dict[str, Any]:
-    """Return what is told of a cycle, None for what is not known."""
-    step, beliefs, estimate = cycle.step, cycle.step.beliefs, cycle.step.estimate
-    return {
-        "t_s": round(step.t_s, 6),
-        "loop": cycle.loop,
-        "mode": step.mode.value,
-        "state": step.state.value,
-        "temperature_c": finite(step.measurement.temperature_c),
-        "quality": step.measurement.quality.value,
-        "setpoint_c": step.setpoint_c,
-        "power": step.command.power,
-        "accepted_power": finite(cycle.accepted_power),
-        "controller": step.controller,
-        "innovation_k": finite(_innovation(estimate)),
-        "inflation": finite(estimate.inflation),
-        "gain": finite(beliefs.gain),
-        "gain_sd": finite(beliefs.gain_sd),
-        "a": finite(beliefs.a),
-        "a_sd": finite(beliefs.a_sd),
-        "tick_us": round(cycle.tick_us, 1),
-        "late_s": round(cycle.late_s, 6),
-        "alarms": [alarm.code for alarm in step.alarms],
-        **{name: value for name, value in cycle.truth.items() if name == "true_temperature_c"},
-    }
-
-
-def _innovation(estimate: Estimate) -> float:
-    return math.nan if estimate.rejected else estimate.innovation
 
 
 class Summary:

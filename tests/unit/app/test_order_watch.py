@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from thermoctl.app.cycle_record import as_line
 from thermoctl.app.daemon import _order_service
 from thermoctl.app.order_watch import Finding, OrderService, OrderWatch, watches_for
-from thermoctl.app.report import as_line
 from thermoctl.app.settings import load
 from thermoctl.app.sim import bench_settings, simulate
 from thermoctl.errors import ConfigError

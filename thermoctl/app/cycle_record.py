@@ -1,0 +1,55 @@
+"""A finished cycle as the keys that leave the program: JSON lines, ``status``, ``watch``.
+
+Kept apart from what is written for people, so that the daemon needs no terminal library for it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from thermoctl.signals import Cycle, Estimate
+
+
+def finite(value: float | None) -> float | None:
+    """Return `value`, None where it is not known; no NaN ever leaves the program."""
+    return None if value is None or not math.isfinite(value) else value
+
+
+def as_line(cycle: Cycle, beside: Mapping[str, Any] = MappingProxyType({})) -> str:
+    """Return the cycle, and keys found beside it, as one JSON object."""
+    return json.dumps({**cycle_record(cycle), **beside}, allow_nan=False)
+
+
+def cycle_record(cycle: Cycle) -> dict[str, Any]:
+    """Return what is told of a cycle, None for what is not known."""
+    step, beliefs, estimate = cycle.step, cycle.step.beliefs, cycle.step.estimate
+    return {
+        "t_s": round(step.t_s, 6),
+        "loop": cycle.loop,
+        "mode": step.mode.value,
+        "state": step.state.value,
+        "temperature_c": finite(step.measurement.temperature_c),
+        "quality": step.measurement.quality.value,
+        "setpoint_c": step.setpoint_c,
+        "power": step.command.power,
+        "accepted_power": finite(cycle.accepted_power),
+        "controller": step.controller,
+        "innovation_k": finite(_innovation(estimate)),
+        "inflation": finite(estimate.inflation),
+        "gain": finite(beliefs.gain),
+        "gain_sd": finite(beliefs.gain_sd),
+        "a": finite(beliefs.a),
+        "a_sd": finite(beliefs.a_sd),
+        "tick_us": round(cycle.tick_us, 1),
+        "late_s": round(cycle.late_s, 6),
+        "alarms": [alarm.code for alarm in step.alarms],
+        **{name: value for name, value in cycle.truth.items() if name == "true_temperature_c"},
+    }
+
+
+def _innovation(estimate: Estimate) -> float:
+    return math.nan if estimate.rejected else estimate.innovation
