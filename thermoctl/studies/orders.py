@@ -101,8 +101,8 @@ class Weighing:
         wide = self.wide
         if any(order.m for order in self.orders) and wide.evidence < EVIDENCE:
             return (
-                f"the input is not heard: it improves the prediction by {wide.evidence:.1f} nats,"
-                f" expected {EVIDENCE:g} or more. It rests, or follows the output"
+                "the input is not heard, it rests or follows the output: expected it to improve the"
+                f" prediction by {EVIDENCE:g} nats, got {max(0.0, wide.evidence):.0f}"
             )
         probability = self.ranked[0][1]
         if probability < DECIDED:
@@ -116,6 +116,11 @@ class Weighing:
     def chosen(self) -> Order | None:
         """The order the record speaks for, or None."""
         return None if self.undecided else self.best
+
+    @property
+    def noise_given(self) -> bool:
+        """Whether R2 is another than that of the wide model."""
+        return self.wide.R2 * self.scaling.y_scale**2 != self.R2
 
     @property
     def edges(self) -> tuple[str, ...]:

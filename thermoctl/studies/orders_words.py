@@ -6,6 +6,7 @@ from typing import Any
 
 from thermoctl.estimation import Order
 from thermoctl.studies.orders import SETTLED, Weighing
+from thermoctl.studies.words import counted
 
 SHOWN = 5
 """Candidates of a table."""
@@ -49,12 +50,14 @@ def orders_lines(weighing: Weighing) -> list[str]:
     else:
         verdict = f"undecided; {order_text(best)}, the most probable, is used. Why: "
         verdict += weighing.undecided
+    wide = weighing.wide
+    source = "given" if weighing.noise_given else "from its errors"
     lines = [
         f"Orders   {len(weighing.orders)} weighed on {weighing.samples:,} samples: {verdict}",
-        f"         noise sd {weighing.R2**0.5:.4g} from the errors of a model of"
-        f" {weighing.wide.order.n} past outputs and {weighing.wide.order.m} inputs;"
-        f" the input foresees {percent(weighing.wide.heard)} of what past outputs leave open"
-        f" ({weighing.wide.evidence:.0f} nats)",
+        f"         in a model of {counted(wide.order.n, 'past output')} and"
+        f" {counted(wide.order.m, 'input')} the input foresees {percent(wide.heard)} of what past"
+        f" outputs leave open ({max(0.0, wide.evidence):.0f} nats); noise sd"
+        f" {weighing.R2**0.5:.4g}, {source}",
     ]
     if weighing.edges:
         lines.append(

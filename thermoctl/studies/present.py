@@ -18,7 +18,7 @@ from thermoctl.studies.orders import Weighing
 from thermoctl.studies.orders_words import orders_json, orders_lines, orders_rows
 from thermoctl.studies.record import Record
 from thermoctl.studies.replay import Replay
-from thermoctl.studies.words import ascii_only, duration, is_utf8, number, probability
+from thermoctl.studies.words import ascii_only, counted, duration, is_utf8, number, probability
 
 Spelling = Callable[[str], str]
 """Turns words into those that the console can show; before they are laid out in columns."""
@@ -114,7 +114,8 @@ def _about_conditions(result: Replay) -> list[str]:
         )
     return [
         *(orders_lines(result.weighing) if result.weighing else ()),
-        f"Model    {c.order.n} past outputs, {c.order.m} inputs, delay {c.order.delay}; {kept}",
+        f"Model    {counted(c.order.n, 'past output')}, {counted(c.order.m, 'input')},"
+        f" delay {c.order.delay}; {kept}",
         f"Noise    R2 = {c.R2:.4g} (sd {math.sqrt(c.R2):.4g}), {c.R2_source}",
         f"Score    {c.scored:,} predictions from sample {c.scored_from + 1:,} on;"
         f" the last value as prediction: rms {c.persistence_rms:.4g}",

@@ -53,6 +53,11 @@ def probability(p: float) -> str:
     return "< 0.001" if p < 0.001 else f"{p:.2g}" if p < 0.1 else f"{p:.2f}"
 
 
+def counted(count: int, what: str) -> str:
+    """Return how many there are of `what`, which takes an s when they are not one."""
+    return f"{count:,} {what}{'' if count == 1 else 's'}"
+
+
 def duration(seconds: float) -> str:
     """Return a length of time in its two largest units."""
     if seconds < 60.0:

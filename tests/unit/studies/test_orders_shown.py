@@ -92,6 +92,12 @@ def test_a_table_shows_the_most_probable_orders():
     assert "from sample" in text
 
 
+@pytest.mark.parametrize(("given", "source"), [({}, "from its errors"), ({"R2": 0.02}, "given")])
+def test_the_lines_say_where_the_noise_comes_from(given, source):
+    (line,) = (each for each in printed(replayed(made(), **given)).splitlines() if "nats" in each)
+    assert line.endswith(source)
+
+
 @pytest.mark.parametrize(
     ("probability", "shown"),
     [(1.0, "100 %"), (0.99999, "> 99.9 %"), (0.5, "50 %"), (1e-5, "< 0.1 %"), (0.0, "0 %")],

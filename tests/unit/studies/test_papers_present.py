@@ -57,6 +57,15 @@ def test_the_runs_that_are_finished_are_said_and_not_those_asked_for():
     assert "1 run, seed 3" in printed(replace(OUTCOME, replications=1))
 
 
+def test_words_begin_and_numbers_end_together():
+    columns = (*Made.columns, Column("word", "in words"))
+    study = type("Worded", (Made,), {"columns": columns})
+    rows = [{**row, "word": word} for row, word in zip(ROWS, ("long word", "word"), strict=True)]
+    above, below = printed(replace(OUTCOME, table=rows), study).splitlines()[-2:]
+    assert above.index("long word") == below.index("word")
+    assert above.index("0.5") + len("0.5") == below.index("yes") + len("yes")
+
+
 def test_every_row_is_printed_under_the_headings():
     rows = [line.split() for line in printed().splitlines()[-2:]]
     assert rows == [["one", "−1.23", "0.5"], ["another", "–", "yes"]]

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from thermoctl.studies.words import duration, number, probability
+from thermoctl.studies.words import counted, duration, number, probability
 
 
 @pytest.mark.parametrize(
@@ -42,3 +42,7 @@ def test_a_probability_is_not_written_finer_than_it_is_known(p, words):
 )
 def test_a_duration_is_told_in_its_two_largest_units(seconds, words):
     assert duration(seconds) == words
+
+
+def test_one_of_a_thing_takes_no_s():
+    assert [counted(n, "input") for n in (0, 1, 2000)] == ["0 inputs", "1 input", "2,000 inputs"]

@@ -50,7 +50,7 @@ def draw_page(outcome: Outcome, title: str, files: Sequence[Path]) -> list[Path]
             left=0.085, right=0.885, top=0.91, bottom=0.065, hspace=0.42, wspace=0.66
         )
         count = outcome.replications
-        runs = f"mean of {count:,} replications" if count > 1 else "one replication"
+        runs = f"mean of {count:,} runs" if count > 1 else "one run"
         page.text(0.085, 0.97, title, fontsize=9, fontweight="bold", color=house.INK, va="center")
         page.text(0.885, 0.97, runs, fontsize=7.5, color=house.MUTE, va="center", ha="right")
         panels = dict(zip(_AXES, axes.flat, strict=False))

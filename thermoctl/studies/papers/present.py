@@ -10,6 +10,7 @@ from rich.console import Console
 
 from thermoctl.studies.papers.study import Cell, Column, Outcome, Study
 from thermoctl.studies.present import empty_table, print_table, spelling
+from thermoctl.studies.words import counted
 
 
 def outcome_json(study: Study, outcome: Outcome, files: Sequence[Path]) -> dict[str, Any]:
@@ -32,6 +33,9 @@ def print_outcome(console: Console, study: Study, outcome: Outcome) -> None:
     for line in (study.title, f"{runs(outcome)}, seed {study.seed}"):
         console.print(spell(line), style="none", markup=False, soft_wrap=True)
     table = empty_table(spell, *(column.heading for column in study.columns))
+    for place, column in enumerate(study.columns):
+        if all(isinstance(row[column.key], str) for row in outcome.table):
+            table.columns[place].justify = "left"
     for row in outcome.table:
         table.add_row(*(spell(shown(row[column.key], column)) for column in study.columns))
     print_table(console, table)
@@ -39,7 +43,7 @@ def print_outcome(console: Console, study: Study, outcome: Outcome) -> None:
 
 def runs(outcome: Outcome) -> str:
     """Return how many runs are behind `outcome`, in words."""
-    return f"{outcome.replications:,} run{'s' if outcome.replications > 1 else ''}"
+    return counted(outcome.replications, "run")
 
 
 def shown(cell: Cell, column: Column) -> str:
