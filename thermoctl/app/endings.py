@@ -1,6 +1,6 @@
 """How a command ends: streams closed, full or narrow; errors in one line each.
 
-Exit codes: 1 failed, 2 wrong usage, 69 something is missing or held, 77 not permitted, 78 bad
+Exit codes: 1 failed, 2 wrong usage, 3 no daemon runs, 4 an alarm is active, 69 something is missing or held, 77 not permitted, 78 bad
 configuration, 130 interrupted.
 """
 
@@ -17,10 +17,10 @@ from typing import Any, Final, TextIO
 
 import click
 
-from thermoctl.errors import ConfigError, NotPermitted, ThermoctlError, Unavailable
+from thermoctl.errors import ConfigError, NotPermitted, NotRunning, ThermoctlError, Unavailable
 
 EXIT_FAILED, EXIT_USAGE, EXIT_UNAVAILABLE, EXIT_PERMISSION, EXIT_CONFIG = 1, 2, 69, 77, 78
-EXIT_INTERRUPTED = 130
+EXIT_NOT_RUNNING, EXIT_ALARM, EXIT_INTERRUPTED = 3, 4, 130
 
 EXPECTED: Final = (click.ClickException, click.Abort, ThermoctlError, OSError)
 """What a command may end with; anything else is a bug and keeps its traceback."""
@@ -85,6 +85,8 @@ def exit_code_of(error: BaseException) -> int:
             return error.exit_code
         case ConfigError():
             return EXIT_CONFIG
+        case NotRunning():
+            return EXIT_NOT_RUNNING
         case Unavailable():
             return EXIT_UNAVAILABLE
         case NotPermitted() | PermissionError():
@@ -119,7 +121,16 @@ def _usage(error: click.ClickException) -> str:
     if text[:1].isupper() and text[1:2].islower():
         text = text[0].lower() + text[1:]
     context = error.ctx if isinstance(error, click.UsageError) else None
+    if type(error).__name__ == "NoArgsIsHelpError":  # since click 8.2, with a whole page for text
+        text = f"expected a command, {_commands(context)}"
     return text if context is None else f"{text}; see {context.command_path} --help"
+
+
+def _commands(context: click.Context | None) -> str:
+    """Return the names of the commands of a group."""
+    if context is None or not isinstance(context.command, click.Group):
+        return "got none"
+    return f"one of {', '.join(context.command.list_commands(context))}"
 
 
 def tell(error: BaseException, arguments: Sequence[str]) -> int:

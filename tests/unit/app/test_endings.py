@@ -60,6 +60,10 @@ def test_an_error_of_the_system_is_told_by_file_and_words_without_its_number():
         ("--sim run", "expected --sim without a command"),
         ("run --fast", "no such option '--fast'"),
         ("swim", "no such command 'swim'"),
+        (
+            "reproduce",
+            "expected a command, one of ozbek2021, bicer2017, lainiotis, experiment; see",
+        ),
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(capsys, arguments, told):
