@@ -169,7 +169,7 @@ class Bank:
         ahead = outlook(met.block, way, met.weights.share, hypotheses, bounds)
         if not math.isfinite(np.vdot(met.block, met.block) + ahead.coasting_c):
             raise ArithmeticError(f"expected a finite belief after {y_c!r} degC at {applied!r}")
-        for array in (met.block, *met.weights[:2], *way):
+        for array in (met.block, *way):
             array.setflags(write=False)
         return BankBelief(sample, blind, excitation, way, *met, ahead)
 

@@ -65,7 +65,7 @@ def outlook(
     np.subtract(path.heat, holding, out=coasting)
     coasting *= hypotheses.element
     coasting += path.pending
-    coasting -= hypotheses.dead * holding
+    coasting -= hypotheses.dead_periods * holding
     coasting *= beta
     coasting += x[T]
     means[2] = hypotheses.lag_s

@@ -163,10 +163,17 @@ class Weights(NamedTuple):
         np.maximum(log, FLOOR, out=log)
         share = np.exp(log)
         share /= share.sum()
-        return Weights(log, share, likeliest)
+        return _read_only(Weights(log, share, likeliest))
 
 
 def equal(hypotheses: Hypotheses) -> Weights:
     """Return the weights before any evidence."""
     n = len(hypotheses)
-    return Weights(np.zeros(n), np.full(n, 1.0 / n), 0)
+    return _read_only(Weights(np.zeros(n), np.full(n, 1.0 / n), 0))
+
+
+def _read_only(weights: Weights) -> Weights:
+    """Return `weights` after making both arrays read-only."""
+    weights.log.setflags(write=False)
+    weights.share.setflags(write=False)
+    return weights

@@ -36,6 +36,8 @@ class Hypotheses:
         Total lag L: dead time, heater and sensor together.
     dead : ndarray of int
         Dead time in whole periods.
+    dead_periods : ndarray
+        The same, to reckon with: integers would be converted at every sample.
     element : ndarray
         Time constant of the heater in periods.
     element_step, sensor_step : ndarray
@@ -45,6 +47,7 @@ class Hypotheses:
     period_s: float
     lag_s: Array
     dead: npt.NDArray[np.intp]
+    dead_periods: Array
     element: Array
     element_step: Array
     sensor_step: Array
@@ -71,10 +74,12 @@ class Hypotheses:
         lags_s = SHORTEST_LAG_S * LONGEST_OVER_SHORTEST ** (np.arange(LAGS) / (LAGS - 1.0))
         lag_s = np.repeat(lags_s, len(SHAPES))
         dead_s, element_s, sensor_s = np.tile(np.array(SHAPES), (LAGS, 1)).T * lag_s
+        dead_periods = np.rint(dead_s / period_s)
         return cls(
             period_s=float(period_s),
             lag_s=lag_s,
-            dead=np.rint(dead_s / period_s).astype(np.intp),
+            dead=dead_periods.astype(np.intp),
+            dead_periods=dead_periods,
             element=element_s / period_s,
             element_step=-np.expm1(-period_s / element_s),
             sensor_step=-np.expm1(-period_s / sensor_s),

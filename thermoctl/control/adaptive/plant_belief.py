@@ -94,8 +94,10 @@ def plant_belief(bank: Bank, belief: BankBelief, sign: float = 1.0) -> PlantBeli
 def mixed(means: Array, variances: Array, share: Array) -> tuple[float, float]:
     """Return mean and standard deviation of a mixture with the weights `share`."""
     mean = float(share.dot(means))
-    away = means - mean
-    return mean, math.sqrt(max(float(share.dot(variances + away * away)), 0.0))
+    spread = means - mean
+    spread *= spread
+    spread += variances
+    return mean, math.sqrt(max(float(share.dot(spread)), 0.0))
 
 
 def gain(bank: Bank, belief: BankBelief) -> tuple[float, float]:
@@ -111,8 +113,10 @@ def holding_power_sd(belief: BankBelief) -> float:
     block = belief.block
     beta = block[BETA, X]
     power = block[D, X] / beta
-    slope = block[D, D] - 2.0 * power * block[D, BETA] + power * power * block[BETA, BETA]
-    return mixed(power, slope / (beta * beta), belief.weights.share)[1]
+    slope = block[D, D] - 2.0 * power * block[D, BETA]
+    slope += power * power * block[BETA, BETA]
+    slope /= beta * beta
+    return mixed(power, slope, belief.weights.share)[1]
 
 
 def lag_quantiles(bank: Bank, belief: BankBelief) -> tuple[float, float]:
