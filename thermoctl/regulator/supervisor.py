@@ -63,7 +63,7 @@ class Supervisor:
         self._reading = math.nan
         self._good_s = 0.0  # good readings without a break
         self._blind_s = 0.0  # time without a good reading that was not paid back yet
-        self._interval_s = 0.0
+        self._seen_s = 0.0  # what the last reading answers for
         self._tripping: Verdict | None = None
         self._tripped_lately = False
         self._opened_s: deque[float] = deque(maxlen=limits.OPEN_COUNT)
@@ -87,10 +87,9 @@ class Supervisor:
         before = self._judged.verdict
         self._judged = judge(self._judged, measurement, self.limits, jump_k)
         self._reading = measurement.temperature_c
-        self._interval_s = interval_s
+        self._seen_s = seen_s = self.limits.seen_s(interval_s)
         verdict = self._judged.verdict
         if verdict is Verdict.GOOD:
-            seen_s = self.limits.seen_s(interval_s)
             self._good_s += seen_s if before is Verdict.GOOD else 0.0
             self._blind_s = max(0.0, self._blind_s - seen_s)
         else:
@@ -240,7 +239,7 @@ class Supervisor:
         power = clamp(asked, 0.0, self.limits.power_max)
         if power != asked:
             reason = "limit.high" if asked > power else "limit.low"
-        step = self.limits.rise_per_s * self.limits.seen_s(self._interval_s)
+        step = self.limits.rise_per_s * self._seen_s
         if power > self._last_power + step:
             return self._last_power + step, "limit.rate"
         return power, reason
