@@ -16,7 +16,9 @@ from thermoctl.studies.tuning import Tuning
 from thermoctl.studies.words import number
 
 _HEIGHTS_IN = (1.6, 0.7, 1.2, 1.7)
-_TOP_IN, _BOTTOM_IN, _SPACE_IN = 0.45, 0.5, 0.62
+_TOP_IN, _BOTTOM_IN = 0.45, 0.5
+_CLOSE_IN, _APART_IN = 0.36, 0.76
+"""Between panels of one time axis, and above one that has its own."""
 _LABEL_GAP = 0.09
 _LAGS_SHOWN, _LEAST_SHOWN = 4.0, 30.0
 
@@ -35,17 +37,14 @@ def draw_tuning(tuning: Tuning, excitation: Excitation, paths: list[Path]) -> li
     """
     chosen = () if tuning.given else _HEIGHTS_IN[2:3]
     heights = [*_HEIGHTS_IN[:2], *chosen, _HEIGHTS_IN[3]]
-    height = sum(heights) + _SPACE_IN * (len(heights) - 1) + _TOP_IN + _BOTTOM_IN
-    grid = {"gridspec_kw": {"height_ratios": heights}}
-    with house.styled(house.WIDE_IN, height, len(heights), 1, **grid) as (figure, axes):
-        figure.subplots_adjust(
-            left=0.115,
-            right=0.865,
-            top=1.0 - _TOP_IN / height,
-            bottom=_BOTTOM_IN / height,
-            hspace=_SPACE_IN * len(heights) / sum(heights),
-        )
+    spaces = [_TOP_IN, *[_CLOSE_IN] * (len(heights) - 2), _APART_IN]
+    height = sum(heights) + sum(spaces) + _BOTTOM_IN
+    with house.styled(house.WIDE_IN, height, len(heights), 1) as (figure, axes):
         panels = list(axes[:, 0])
+        top = height
+        for panel, space, own in zip(panels, spaces, heights, strict=True):
+            top -= space + own
+            panel.set_position((0.115, top / height, 0.75, own / height))
         _draw_run(tuning, excitation, panels[:-1])
         _draw_answer(tuning, panels[-1])
         for index, panel in enumerate(panels):
@@ -62,7 +61,7 @@ def _draw_run(tuning: Tuning, excitation: Excitation, panels: list[Any]) -> None
     panels[0].axhspan(
         excitation.bottom_c, excitation.top_c, color=house.ALLOWED, alpha=0.5, linewidth=0
     )
-    panels[0].set_ylabel("°C")
+    panels[0].set_ylabel("temperature, °C")
     panels[1].set_ylabel("power")
     house.score(
         panels[0],
