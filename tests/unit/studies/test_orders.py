@@ -90,6 +90,12 @@ def test_a_record_that_never_comes_to_rest_is_centred_where_it_would():
     assert weighing.chosen == Order(1, 1, 2)
 
 
+def test_a_record_that_does_not_know_its_rest_is_centred_at_its_means():
+    u, y = driven(b=0.0)
+    scaling = weigh(record(u, y), FEW).scaling
+    assert (scaling.u_centre, scaling.y_centre) == (np.mean(u), np.mean(y))
+
+
 def test_samples_behind_a_gap_are_only_remembered():
     u, y = driven(samples=600)
     reach = 5
