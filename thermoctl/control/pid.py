@@ -121,7 +121,7 @@ class Pid:
         if self.tuning == "fixed":
             return None
         derivative = self.tuned_form == "pid"
-        test: StepTest | RelayTest = RelayTest(derivative, self.relay_amplitude)
+        test: StepTest | RelayTest = RelayTest(derivative, self.relay_amplitude, self.period_s)
         if self.tuning == "simc":
             test = StepTest(derivative, self.period_s)
         return AutoTune(test, self.tuning_limit_s, self.period_s)
