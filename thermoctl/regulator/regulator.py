@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from thermoctl.errors import Refused
 from thermoctl.estimation.identifier import Identifier, IdentifierBelief
 from thermoctl.ports import Controller, Situation
-from thermoctl.quantities import clamp, is_finite_number
+from thermoctl.quantities import Array, clamp, is_finite_number
 from thermoctl.regulator.guard import Guard
 from thermoctl.regulator.holding import Holding
 from thermoctl.regulator.judge import Verdict
@@ -272,7 +272,7 @@ class Regulator:
             foreseen = None if seen else identifier.foresee(last, applied)
             after = identifier.update(before, temperature_c, applied)
             estimate = after.estimate
-            return after, foreseen, math.isfinite(float(estimate.theta.sum() + estimate.P.sum()))
+            return after, foreseen, _all_finite(estimate.theta) and _all_finite(estimate.P)
 
         kept: tuple[IdentifierBelief, IdentifierBelief | None, bool] = (before, None, True)
         after, self._foreseen, finite = self._guard.call(learn, kept, "estimator.failed", t_s)
@@ -349,8 +349,10 @@ class Regulator:
             self._supervisor.fail("output.nan", 11, text, t_s)
 
     def _finish(self, measurement: Measurement, situation: Situation, beliefs: Beliefs) -> Step:
-        events = tuple(Event(situation.t_s, name, fields) for name, fields in self._events)
-        self._events.clear()
+        events: tuple[Event, ...] = ()
+        if self._events:
+            events = tuple(Event(situation.t_s, name, fields) for name, fields in self._events)
+            self._events.clear()
         return Step(
             t_s=situation.t_s,
             measurement=measurement,
@@ -370,3 +372,8 @@ class Regulator:
 
     def _emit(self, name: str, **fields: object) -> None:
         self._events.append((name, fields))
+
+
+def _all_finite(values: Array) -> bool:
+    """Return whether every number is finite; plain floats, which add up without a warning."""
+    return math.isfinite(sum(values.ravel().tolist()))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 from thermoctl.ports import Situation
 from thermoctl.quantities import clamp, is_finite_number
@@ -57,11 +56,9 @@ class Steering:
 
         def beliefs() -> Beliefs:
             told = mind.controller.beliefs(mind.belief, situation)
-            if told.a is None and otherwise.a is not None:
-                told = replace(told, a=otherwise.a, a_sd=otherwise.a_sd)
-            if told.holding_power is None and otherwise.holding_power is not None:
-                told = replace(told, holding_power=otherwise.holding_power)
-            return told
+            pole = otherwise if told.a is None else told
+            holding = otherwise if told.holding_power is None else told
+            return Beliefs(told.gain, told.gain_sd, pole.a, pole.a_sd, holding.holding_power)
 
         return self._guard.call(beliefs, Beliefs(), _FAILED, situation.t_s)
 
