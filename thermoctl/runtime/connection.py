@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 from thermoctl.errors import DriverError, LinkError, TransientError, WrongDevice
-from thermoctl.ports import Board, Clock, Identity
+from thermoctl.ports import Board, Clock, Identity, Simulated
 from thermoctl.signals import RawSample
 
 OPEN_S = 5.0
@@ -53,6 +53,7 @@ class Connection:
         self.name = name
         self._build, self._clock, self._report, self._beside = build, clock, report, beside
         self._board: Board | None = None
+        self._simulated: Simulated | None = None  # the same one, if it is: asked once, not a cycle
         self._opening: threading.Thread | None = None
         self._opened: Board | DriverError | None = None
         self._identity = Identity("", "", "")
@@ -94,6 +95,10 @@ class Connection:
         if zero and all(taken.get(name) == 0.0 for name in outputs):
             self._driven = False
         return taken
+
+    def truth(self) -> Mapping[str, float]:
+        """Return what a simulated board knows of its plant; nothing of any other."""
+        return {} if self._simulated is None else self._simulated.truth()
 
     def close(self) -> None:
         """Let the board go, safe values first; one still opening is closed then."""
@@ -173,6 +178,7 @@ class Connection:
             opened = LinkError("opening it has not come to an end")
         if not isinstance(opened, DriverError):
             self._board, self._retry_s, self._driven = opened, _RETRY_FIRST_S, False
+            self._simulated = opened if isinstance(opened, Simulated) else None
             self._answered_s = self._clock.now_s()
             who = self._identity
             self._report("board.opened", board=self.name, kind=who.kind, version=who.version)
@@ -193,7 +199,7 @@ class Connection:
         self._wait()
 
     def _let_go(self) -> None:
-        board, self._board = self._board, None
+        board, self._board, self._simulated = self._board, None, None
         if board is not None:
             self._close_quietly(board)
 

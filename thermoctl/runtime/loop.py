@@ -18,7 +18,7 @@ from functools import partial
 from thermoctl.errors import DriverError, FaultError, LinkError, Refused
 from thermoctl.model.actuator import ActuatorLaw
 from thermoctl.model.sensor import Sensor
-from thermoctl.ports import Clock, Simulated
+from thermoctl.ports import Clock
 from thermoctl.quantities import is_finite_number
 from thermoctl.regulator import Regulator
 from thermoctl.regulator.limits import command_lasts_s
@@ -261,7 +261,7 @@ class Loop:
 
         def publish() -> None:
             told = replace(step, events=(*step.events, *events)) if events else step
-            truth = _truth(wiring.sensor_board)
+            truth = wiring.sensor_board.truth()
             self._publish(Cycle(wiring.name, told, accepted, tick_us, late_s, self.missed, truth))
 
         self._harmless(publish)
@@ -363,7 +363,3 @@ class Loop:
 def _power(law: ActuatorLaw, drive: float | None) -> float:
     """Return the power of what the hardware took; NaN, and not 0, when it does not say."""
     return law.power_from(drive) if is_finite_number(drive) else math.nan  # type: ignore[arg-type]
-
-
-def _truth(board: Connection) -> Mapping[str, float]:
-    return board.board.truth() if isinstance(board.board, Simulated) else {}
