@@ -38,7 +38,7 @@ from thermoctl.studies.excitation import Excitation
 from thermoctl.studies.laws import parse_order_or_auto
 from thermoctl.studies.orders import USUAL
 from thermoctl.studies.record import RecordError
-from thermoctl.studies.tuning import tune
+from thermoctl.studies.tuning import needed, tune
 from thermoctl.studies.words import ascii_only, duration, is_utf8
 
 LONGEST_S: Final = 172_800.0
@@ -168,6 +168,13 @@ class _Asked:
     state: Path | None
     as_json: bool
 
+    @property
+    def orders(self) -> Sequence[Order]:
+        """The order that is given, or the candidates to weigh."""
+        if self.order is not None:
+            return (Order(self.order.n, self.order.m, self.order.delay),)
+        return self.candidates or USUAL
+
 
 def _settings(asked: _Asked) -> Settings:
     """Return the configuration; for a simulation, with a tank in place of every board."""
@@ -188,7 +195,14 @@ def _planned(settings: Settings, asked: _Asked) -> tuple[str, Excitation]:
     try:
         if asked.duration_s > LONGEST_S:
             raise ConfigError(f"expected at most {duration(LONGEST_S)}, got {asked.duration_s:g} s")
-        return name, plan(settings, name, asked.powers, asked.band_k, asked.duration_s, asked.seed)
+        excitation = plan(settings, name, asked.powers, asked.band_k, asked.duration_s, asked.seed)
+        least_s = needed(asked.orders) * settings.loop(name)[1].period_s
+        if asked.duration_s < least_s:
+            raise ConfigError(
+                f"expected a duration of at least {least_s:g} s for orders that look back so far,"
+                f" got {asked.duration_s:g} s"
+            )
+        return name, excitation
     except ConfigError as problem:
         raise click.UsageError(str(problem), click.get_current_context()) from problem
 
@@ -216,15 +230,11 @@ def _learnt(
     """Return the report of a run; too few samples teach nothing, and that is told."""
     outcome, collector = ran
     table = settings.loop(name)[1]
-    order = asked.order
-    candidates = asked.candidates or USUAL
-    if order is not None:
-        candidates = (Order(order.n, order.m, order.delay),)
     record = tuning = None
     why = ""
     try:
         record = collector.finish()
-        tuning = tune(record, candidates, table.setpoint_c)
+        tuning = tune(record, asked.orders, table.setpoint_c)
     except RecordError as problem:
         why = str(problem)
     return Report(name, table, asked.sim, excitation, outcome, record, tuning, why)

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from thermoctl.estimation import Order
 from thermoctl.studies.laws import parse_law
 from thermoctl.studies.orders import Weighing, weigh
-from thermoctl.studies.plant_words import REACH, PlantWords, plant_words
+from thermoctl.studies.plant_words import LAGS, REACH, PlantWords, plant_words
 from thermoctl.studies.record import Record
 from thermoctl.studies.replay import Score, replay
+from thermoctl.studies.wide import samples_needed
 
 _LAW = parse_law("nkf")
 """The normal filter without drift: over a record it is least squares, with honest error bars."""
@@ -67,5 +68,14 @@ def tune(record: Record, candidates: Sequence[Order], setpoint_c: float) -> Tuni
     """
     weighing = weigh(record, candidates)
     result = replay(record, weighing, [_LAW])
-    reach = max(REACH, *(order.structure().u_memory for order in weighing.orders))
-    return Tuning(record, weighing, result.scores[0], plant_words(record, setpoint_c, reach))
+    words = plant_words(record, setpoint_c, _reach(candidates))
+    return Tuning(record, weighing, result.scores[0], words)
+
+
+def needed(candidates: Sequence[Order]) -> int:
+    """Return how many samples without a gap `tune` takes at least."""
+    return samples_needed(max(LAGS, *(order.n for order in candidates)), _reach(candidates))
+
+
+def _reach(candidates: Sequence[Order]) -> int:
+    return max(REACH, *(order.structure().u_memory for order in candidates))

@@ -111,6 +111,11 @@ def fit_wide(record: Record, y: Array, u: Array, n: int, reach: int) -> WideMode
     return WideModel(order, frozen(theta), frozen(covariance), R2, samples, evidence)
 
 
+def samples_needed(n: int, reach: int) -> int:
+    """Return how many samples without a gap the model of these lags takes to be fitted."""
+    return SAMPLES_PER_PARAMETER * (n + reach + 1) + n + reach
+
+
 def _least_squares(scaled: Scaled) -> tuple[Array, Array, Array]:
     """Return theta with its constant, the inverse of its information, and the errors."""
     parameters = scaled.order.parameters + 1

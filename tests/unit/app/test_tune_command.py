@@ -229,6 +229,9 @@ def test_without_a_terminal_and_without_yes_nothing_is_touched(tmp_path):
         (("--order", "1"), "expected auto or n,m,d"),
         (("--order", "1,1,1", "--candidates", "1,1,1"), "only with --order auto"),
         (("--candidates", "1,1"), "n,m,d or ranges of them"),
+        (("--order", "2,1,300"), "at least 1519 s for orders that look back so far, got 1200 s"),
+        (("--candidates", "250,1,1"), "expected orders that reach back 200 samples"),
+        (("--candidates", "1-3,1,200", "--duration", "5m"), "at least 1019 s for orders"),
     ],
 )
 def test_what_cannot_be_done_is_refused_before_anything_is_made(tmp_path, words, message):

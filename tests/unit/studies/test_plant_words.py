@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from thermoctl.estimation import Order
 from thermoctl.studies.plant_words import plant_words
-from thermoctl.studies.record import Columns, Record
+from thermoctl.studies.record import Columns, Record, RecordError
+from thermoctl.studies.tuning import needed, tune
 
 GAIN_K_PER_MIN, LOSS_PER_MIN, REST_C = 2.4, 0.04, 15.0
 
@@ -95,3 +97,11 @@ def test_a_power_that_moved_once_claims_no_gain(moved):
     power = np.ones(600)
     power[moved] = 0.0
     assert plant_words(tank(noise=0.02, samples=600, power=power), 37.5) is None
+
+
+@pytest.mark.parametrize("order", [Order(1, 1, 1), Order(5, 2, 40)])
+def test_a_tuning_takes_no_fewer_samples_than_it_says(order):
+    enough = needed([order])
+    assert tune(tank(samples=enough), [order], 37.5).order == order
+    with pytest.raises(RecordError, match="got"):
+        tune(tank(samples=enough - 1), [order], 37.5)
