@@ -25,6 +25,10 @@ class Unavailable(ThermoctlError):  # noqa: N818
     """Something needed is not there; the message says what to install."""
 
 
+class NotRunning(Unavailable):
+    """No daemon is there to answer."""
+
+
 class NotPermitted(ThermoctlError):  # noqa: N818
     """This user may not do what is needed; the message says what that is."""
 

@@ -1,4 +1,4 @@
-"""A finished cycle as the keys that leave the program: JSON lines, ``status``, ``watch``.
+"""A finished cycle as the keys that leave the program.
 
 Kept apart from what is written for people, so that the daemon needs no terminal library for it.
 """
@@ -8,6 +8,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import Any
 
@@ -17,6 +19,12 @@ from thermoctl.signals import Cycle, Estimate
 def finite(value: float | None) -> float | None:
     """Return `value`, None where it is not known; no NaN ever leaves the program."""
     return None if value is None or not math.isfinite(value) else value
+
+
+def iso_time(utc_s: float) -> str | None:
+    """Return a time in s since 1970 UTC as ISO 8601, None where it is not known."""
+    known = math.isfinite(utc_s)
+    return datetime.fromtimestamp(utc_s, UTC).isoformat(timespec="seconds") if known else None
 
 
 def as_line(cycle: Cycle, beside: Mapping[str, Any] = MappingProxyType({})) -> str:
@@ -44,6 +52,11 @@ def cycle_record(cycle: Cycle) -> dict[str, Any]:
         "gain_sd": finite(beliefs.gain_sd),
         "a": finite(beliefs.a),
         "a_sd": finite(beliefs.a_sd),
+        "holding_power": finite(beliefs.holding_power),
+        "lag_s": finite(beliefs.lag_s),
+        "shadow": step.shadow,
+        "shadow_power": step.shadow_power,
+        "shadow_score": None if step.shadow_score is None else asdict(step.shadow_score),
         "tick_us": round(cycle.tick_us, 1),
         "late_s": round(cycle.late_s, 6),
         "alarms": [alarm.code for alarm in step.alarms],

@@ -18,11 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thermoctl import __version__
+from thermoctl.app.clerk import Clerk
 from thermoctl.app.compose import loop_for
 from thermoctl.app.resuming import Resumption, kept_latches
 from thermoctl.app.settings import Settings, default_files, load_all
 from thermoctl.errors import ConfigError
 from thermoctl.runtime.clock import MonotonicClock
+from thermoctl.services.control_place import ControlPlace, checked, mode_for, own_path
+from thermoctl.services.control_socket import ControlSocket
 from thermoctl.services.history.schema import RunInfo
 from thermoctl.services.history.writer import HistoryWriter
 from thermoctl.services.journal import Journal, sink_for
@@ -72,16 +75,20 @@ class Daemon:
         Configuration files; the machine's when empty.
     state : Path, optional
         State folder from the command line.
+    socket : Path, optional
+        Where to listen for clients; in the runtime folder when not given.
 
     Raises
     ------
     ConfigError
         The configuration is bad; nothing has been switched on.
     Unavailable
-        Another daemon holds the state folder or a device.
+        Another daemon holds the state folder or a device; or `socket` is too long a path.
     """
 
-    def __init__(self, files: Sequence[Path], state: Path | None = None) -> None:
+    def __init__(
+        self, files: Sequence[Path], state: Path | None = None, socket: Path | None = None
+    ) -> None:
         self._files = list(files) or default_files()
         settings = load_all(self._files)
         _require_patient_watchdog(settings)
@@ -112,11 +119,20 @@ class Daemon:
             self._latches, self._acknowledged_on_disk, report=self._journal.emit
         )
         self._orders = _order_service(settings, self._emit)
+        self._clients = self._control_socket(directory, socket)
         self._off = self._failed = self._ready = False
         self._unreached: list[str] = []
         self._ending = self._reloading = False
         # A service reloads at a hang-up; who started it by hand and closed the terminal is gone.
         self._on_terminal = os.isatty(0)
+
+    def _control_socket(self, state: Path, given: Path | None) -> ControlSocket:
+        place = ControlPlace(own_path() if given is None else checked(given), mode_for())
+        periods_s = {name: table.period_s for name, table in self._settings.loops.items()}
+        clerk = Clerk(
+            self._loop, self._seen.cycles, periods_s, self._latches, state, self._clock.now_s
+        )
+        return ControlSocket(place, clerk, self._emit)
 
     # -- running ---------------------------------------------------------------------------------
 
@@ -137,6 +153,8 @@ class Daemon:
             if self._orders is not None:
                 self._orders.start()
                 stack.callback(self._orders.close)
+            self._clients.start()
+            stack.callback(self._clients.close)
             self._emit("loop.started", None, loops=list(self._settings.loops), version=__version__)
             gc.freeze()  # what is loaded now stays: no collection needs to look at it again
             control = threading.Thread(target=self._control, name="control", daemon=True)
@@ -217,6 +235,7 @@ class Daemon:
             self._history.publish(cycle)
         if self._orders is not None:
             self._orders.publish(cycle)
+        self._clients.publish(cycle)
 
     def _completed(self) -> None:
         """Tell the service manager: ready after the first cycle, alive after every one."""

@@ -1,7 +1,7 @@
 """How a command ends: streams closed, full or narrow; errors in one line each.
 
-Exit codes: 1 failed, 2 wrong usage, 69 something is missing or held, 77 not permitted, 78 bad
-configuration, 130 interrupted.
+Exit codes: 1 failed, 2 wrong usage, 3 no daemon runs, 4 an alarm is active, 69 something is
+missing or held, 77 not permitted, 78 bad configuration, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from typing import Any, Final, TextIO
 
 import click
 
-from thermoctl.errors import ConfigError, NotPermitted, ThermoctlError, Unavailable
+from thermoctl.errors import ConfigError, NotPermitted, NotRunning, ThermoctlError, Unavailable
 
 EXIT_FAILED, EXIT_USAGE, EXIT_UNAVAILABLE, EXIT_PERMISSION, EXIT_CONFIG = 1, 2, 69, 77, 78
-EXIT_INTERRUPTED = 130
+EXIT_NOT_RUNNING, EXIT_ALARM, EXIT_INTERRUPTED = 3, 4, 130
 
 EXPECTED: Final = (click.ClickException, click.Abort, ThermoctlError, OSError)
 """What a command may end with; anything else is a bug and keeps its traceback."""
@@ -85,6 +85,8 @@ def exit_code_of(error: BaseException) -> int:
             return error.exit_code
         case ConfigError():
             return EXIT_CONFIG
+        case NotRunning():
+            return EXIT_NOT_RUNNING
         case Unavailable():
             return EXIT_UNAVAILABLE
         case NotPermitted() | PermissionError():

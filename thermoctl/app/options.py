@@ -122,6 +122,21 @@ def state_option(function: F) -> F:
     )(function)
 
 
+def socket_option(function: F) -> F:
+    """Add ``--socket PATH``."""
+    return click.option(
+        "--socket",
+        type=click.Path(path_type=Path, dir_okay=False, readable=False),
+        metavar="PATH",
+        help="The daemon's control socket; in its runtime folder when not given.",
+    )(function)
+
+
+def loop_option(function: F) -> F:
+    """Add ``--loop NAME``."""
+    return click.option("--loop", metavar="NAME", help="Only this loop.")(function)
+
+
 def json_option(function: F) -> F:
     """Add ``--json``."""
     return click.option("--json", "as_json", is_flag=True, help="Machine-readable output.")(

@@ -8,7 +8,7 @@ _UNFINISHED = "the cycle that took it failed"
 
 
 class Asked:
-    """A request in the loop's queue, which whoever put it there may look at or withdraw.
+    """A request in the loop's queue; its asker may look at it or withdraw it.
 
     The loop and the asker race for it: the first of the two decides whether it is granted or
     withdrawn, and neither ever waits for the other, because popping a list is one step.

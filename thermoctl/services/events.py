@@ -37,6 +37,7 @@ _BY_LEVEL: Final = {
         "output.refused",
         "sensor.open",
         "sensor.short",
+        "socket.failed",
     ),
     "warning": (
         "board.retry",
@@ -60,6 +61,7 @@ _BY_LEVEL: Final = {
         "sensor.spike",
         "sensor.stale",
         "shadow.failed",
+        "socket.unavailable",
         "state.ignored",
     ),
     "info": (
@@ -81,6 +83,7 @@ _BY_LEVEL: Final = {
         "request.refused",
         "setpoint.changed",
         "sim.disturbed",
+        "socket.opened",
         "state.changed",
     ),
 }

@@ -1,0 +1,223 @@
+"""Verbs for a running daemon: ``status``, ``get``, ``set``, ``mode`` and others.
+
+Each is one call through the control socket; the daemon decides, and the words it refuses with are
+shown as they come.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from thermoctl.app.endings import EXIT_ALARM, EXIT_FAILED
+from thermoctl.app.live import numbers
+from thermoctl.app.options import Parsed, examples, json_option, loop_option, socket_option
+from thermoctl.errors import Refused
+from thermoctl.services.control_client import ControlClient
+
+_LATE_PERIODS: Final = 3.0
+_LATE_S: Final = 3.0
+_REPLY_S: Final = 5.0  # beyond what the daemon itself gives its loop
+
+
+def _temperature(text: str) -> float:
+    """Return a temperature in degC; ``ValueError`` if it is no finite number."""
+    try:
+        value_c = float(text)
+    except ValueError:
+        value_c = math.nan
+    if not math.isfinite(value_c):
+        raise ValueError(f"expected a temperature in degC such as 65.0, got {text!r}")
+    return value_c
+
+
+def _power(text: str) -> float:
+    """Return a power in [0, 1], written ``30%`` or ``0.3``; ``ValueError`` if it is none."""
+    percent = text.strip().endswith("%")
+    try:
+        power = float(text.strip().removesuffix("%")) / (100.0 if percent else 1.0)
+    except ValueError:
+        power = math.nan
+    if not 0.0 <= power <= 1.0:
+        raise ValueError(f"expected a power such as 30% or 0.3, from 0 to 1, got {text!r}")
+    return power
+
+
+_TEMPERATURE, _POWER = Parsed("temperature", _temperature), Parsed("power", _power)
+
+
+@click.command(epilog=examples("thermoctl status", "thermoctl status --check --json"))
+@loop_option
+@socket_option
+@click.option("--check", is_flag=True, help="Exit 4 when an alarm is active, 1 when cycles stop.")
+@json_option
+def status(loop: str | None, socket: Path | None, check: bool, as_json: bool) -> int:
+    """Show what the daemon's loops are doing."""
+    with ControlClient(socket) as client:
+        told = client.ask("status", loop=loop)
+        rows = client.ask("alarms", loop=loop)["alarms"] if check else []
+    loops = told["loops"]
+    if as_json:
+        click.echo(json.dumps(_content(told)))
+    else:
+        click.echo("\n\n".join(_described(each) for each in loops), nl=bool(loops))
+    for name in told["waiting"]:
+        click.echo(f"thermoctl: {name} has not finished a cycle yet", err=True)
+    if any(row["active"] or row["latched"] for row in rows):
+        return EXIT_ALARM
+    late = [each["loop"] for each in loops if each["age_s"] > _patience_s(each["period_s"])]
+    for name in late if check else ():
+        click.echo(f"thermoctl: expected {name} to finish cycles, but its last is old", err=True)
+    return EXIT_FAILED if check and (late or told["waiting"]) else 0
+
+
+def _patience_s(period_s: float) -> float:
+    return _LATE_PERIODS * period_s + _LATE_S
+
+
+@click.command(epilog=examples("thermoctl get temperature_c", "thermoctl get power --loop tank"))
+@click.argument("key")
+@loop_option
+@socket_option
+@json_option
+def get(key: str, loop: str | None, socket: Path | None, as_json: bool) -> None:
+    """Show one value of `status --json`, bare."""
+    with ControlClient(socket) as client:
+        value = client.ask("get", key=key, loop=loop)["value"]
+    if as_json:
+        click.echo(json.dumps(value))
+    elif value is None:
+        raise Refused(f"expected {key} to be known, and it is not at this moment")
+    else:
+        click.echo(" ".join(value) if isinstance(value, list) else value)
+
+
+@click.command(
+    "set",
+    context_settings={"ignore_unknown_options": True},  # -5 is a temperature
+    epilog=examples("thermoctl set 65.0", "thermoctl set 40 --loop tank"),
+)
+@click.argument("value_c", metavar="TEMPERATURE", type=_TEMPERATURE)
+@loop_option
+@socket_option
+@json_option
+def set_command(value_c: float, loop: str | None, socket: Path | None, as_json: bool) -> None:
+    """Hold another temperature, in °C."""
+    told = _asked(socket, "set", loop=loop, value_c=value_c)
+    _tell(told, as_json, lambda: f"set point {_plain(numbers.temperature(told['setpoint_c']))}")
+
+
+@click.command(epilog=examples("thermoctl mode auto", "thermoctl mode off --loop tank"))
+@click.argument("mode", type=click.Choice(["off", "manual", "auto"]))
+@loop_option
+@socket_option
+@json_option
+def mode(mode: str, loop: str | None, socket: Path | None, as_json: bool) -> None:
+    """Switch off, hand the power to the operator, or to the controller."""
+    told = _asked(socket, "mode", loop=loop, mode=mode)
+    _tell(told, as_json, lambda: f"mode {told['mode']}")
+
+
+@click.command(epilog=examples("thermoctl output 30%", "thermoctl output 0"))
+@click.argument("power", type=_POWER)
+@loop_option
+@socket_option
+@json_option
+def output(power: float, loop: str | None, socket: Path | None, as_json: bool) -> None:
+    """Give this power while the mode is manual."""
+    told = _asked(socket, "output", loop=loop, power=power)
+    _tell(told, as_json, lambda: f"power {_plain(numbers.power(told['power']))}")
+
+
+@click.command(epilog=examples("thermoctl controller self-tuning-mv"))
+@click.argument("name")
+@loop_option
+@socket_option
+@json_option
+def controller(name: str, loop: str | None, socket: Path | None, as_json: bool) -> None:
+    """Put the shadow in charge, and who was in charge in its shadow."""
+    told = _asked(socket, "controller", loop=loop, name=name)
+    _tell(told, as_json, lambda: f"controller {told['controller']}")
+
+
+@click.command(epilog=examples("thermoctl watch", "thermoctl watch --json"))
+@loop_option
+@socket_option
+@json_option
+def watch(loop: str | None, socket: Path | None, as_json: bool) -> int:
+    """Show every cycle as it is finished, until Ctrl-C."""
+    try:
+        with ControlClient(socket) as client:
+            for cycle in client.watch(loop):
+                click.echo(json.dumps(cycle) if as_json else _line(cycle))
+    except KeyboardInterrupt:
+        pass  # the one way to end it, and no failure
+    return 0
+
+
+# -- asking ----------------------------------------------------------------------------------------
+
+
+def _asked(socket: Path | None, do: str, **keys: Any) -> Mapping[str, Any]:
+    """Return the reply to a request; it takes as long as the slowest loop may take."""
+    with ControlClient(socket) as client:
+        patience_s = float(client.ask("status")["patience_s"])
+        return client.ask(do, patience_s + _REPLY_S, **keys)
+
+
+def _content(told: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a reply without what only the protocol needs."""
+    return {name: value for name, value in told.items() if name not in ("v", "id", "ok")}
+
+
+def _tell(told: Mapping[str, Any], as_json: bool, words: Callable[[], str]) -> None:
+    click.echo(json.dumps(_content(told)) if as_json else f"{told['loop']} : {words()}")
+
+
+# -- words -----------------------------------------------------------------------------------------
+
+
+def _plain(text: str) -> str:
+    """Return `text` with the spaces that a search finds."""
+    return text.replace(numbers.NBSP, " ")
+
+
+def _described(record: Mapping[str, Any]) -> str:
+    """Return the status of one loop, a line a value, the colons below each other."""
+    missing = record["temperature_c"] is None
+    deviation_k = None if missing else record["temperature_c"] - record["setpoint_c"]
+    rows = {
+        "Loop": record["loop"],
+        "Temperature": numbers.temperature(record["temperature_c"]),
+        "Reading": record["quality"],
+        "Set point": numbers.temperature(record["setpoint_c"]),
+        "Deviation": numbers.difference(deviation_k),
+        "Power": numbers.power(record["power"]),
+        "Power taken": numbers.power(record["accepted_power"]),
+        "Mode": record["mode"],
+        "State": record["state"],
+        "Controller": record["controller"],
+        "Alarms": " ".join(record["alarms"]) or "none",
+        "Age": numbers.age(record["age_s"]),
+        "Cycles missed": record["missed"],
+    }
+    width = max(map(len, rows))
+    return _plain("\n".join(f"{name:<{width}} : {value}" for name, value in rows.items()))
+
+
+def _line(record: Mapping[str, Any]) -> str:
+    """Return a finished cycle as one line."""
+    alarms = f"  {' '.join(record['alarms'])}" if record["alarms"] else ""
+    return _plain(
+        f"{datetime.now():%H:%M:%S}  {record['loop']}  "
+        f"{numbers.temperature(record['temperature_c']):>9}  "
+        f"set {numbers.temperature(record['setpoint_c']):>9}  "
+        f"power {numbers.power(record['power']):>7}  "
+        f"{record['mode']} {record['state']}{alarms}"
+    )

@@ -1,0 +1,144 @@
+"""The other end of the control socket, for commands and for other programs."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+from thermoctl.errors import NotPermitted, NotRunning, Refused, Unavailable
+from thermoctl.services.control_place import checked, usual_paths
+from thermoctl.services.control_protocol import VERSION, asking, error_words
+
+ANSWER_S: Final = 5.0
+"""How long a reply may take that needs no cycle of the loop."""
+
+
+class ControlClient:
+    """One connection to a running daemon, as a context.
+
+    Parameters
+    ----------
+    path : Path, optional
+        Its socket; the user's daemon, else the machine's, when not given.
+
+    Raises
+    ------
+    NotRunning
+        No daemon answers.
+    NotPermitted
+        One does, and this user may not talk to it.
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        self._connection = _connected(usual_paths() if path is None else [checked(path)])
+        self._lines = self._connection.makefile("rb")
+        self._calls = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let the connection go; idempotent."""
+        self._lines.close()
+        self._connection.close()
+
+    def ask(self, do: str, patience_s: float = ANSWER_S, **keys: Any) -> Mapping[str, Any]:
+        """Return the content of the reply to a call.
+
+        Parameters
+        ----------
+        do : str
+            What to do, see docs/control.md.
+        patience_s : float
+            How long to wait for the reply, in s.
+        **keys
+            The other keys of the call; those that are None are left out.
+
+        Raises
+        ------
+        Refused
+            The daemon says no; the text says why.
+        NotRunning
+            The daemon has gone.
+        Unavailable
+            No reply in time, or none that can be understood.
+        """
+        self._calls += 1
+        self._connection.settimeout(patience_s)
+        try:
+            self._connection.sendall(asking(self._calls, do, keys))
+            reply = self._next()
+        except TimeoutError as error:
+            raise Unavailable(f"expected a reply within {patience_s:g} s, got none") from error
+        except OSError as error:
+            raise _gone() from error
+        if not reply.get("ok"):
+            raise Refused(error_words(reply.get("error") or {}))
+        return reply
+
+    def watch(self, loop: str | None = None) -> Iterator[Mapping[str, Any]]:
+        """Yield the record of every finished cycle until the daemon ends.
+
+        Raises
+        ------
+        Refused
+            There is no such loop.
+        NotRunning
+            The daemon has gone.
+        """
+        self.ask("watch", loop=loop)
+        self._connection.settimeout(None)
+        while True:
+            try:
+                cycle = self._next().get("cycle")
+            except OSError as error:
+                raise _gone() from error
+            if isinstance(cycle, dict):
+                yield cycle
+
+    def _next(self) -> dict[str, Any]:
+        line = self._lines.readline()
+        if not line:
+            raise _gone()
+        try:
+            reply = json.loads(line)
+        except ValueError as error:
+            raise Unavailable(f"expected a line of JSON, got {line[:60]!r}") from error
+        if not isinstance(reply, dict) or reply.get("v") != VERSION:
+            raise Unavailable(f"expected version {VERSION} of the protocol, got {line[:60]!r}")
+        return reply
+
+
+def _connected(paths: Sequence[Path]) -> socket.socket:
+    """Return a connection to the first path where a daemon answers."""
+    for path in paths:
+        connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        connection.settimeout(ANSWER_S)
+        try:
+            connection.connect(os.fspath(checked(path)))
+        except PermissionError as error:
+            connection.close()
+            raise NotPermitted(f"expected to be allowed to use {path}; try sudo") from error
+        except (OSError, Unavailable):
+            connection.close()
+        else:
+            return connection
+    looked = " or ".join(str(path) for path in paths)
+    raise NotRunning(f"expected a running daemon at {looked}, found none")
+
+
+def _gone() -> NotRunning:
+    return NotRunning("expected the daemon to stay, but it has ended")
