@@ -139,8 +139,8 @@ class Estimate:
 class Beliefs:
     """An estimate in the operator's words; None where the model in use says nothing.
 
-    `gain` is the heating rate at full power in K/s, `a` the pole of the first-order law (27);
-    ``*_sd`` is one standard deviation.
+    `gain` is the heating rate at full power in K/s, `a` the pole of the first-order law (27),
+    `lag_s` the time from heater to reading; ``*_sd`` is one standard deviation.
     """
 
     gain: float | None = None
@@ -148,6 +148,7 @@ class Beliefs:
     a: float | None = None
     a_sd: float | None = None
     holding_power: float | None = None
+    lag_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

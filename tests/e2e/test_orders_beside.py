@@ -12,7 +12,7 @@ import pytest
 pytestmark = pytest.mark.e2e
 
 AQUARIUM = (Path(__file__).parents[2] / "config" / "aquarium.toml").read_text()
-ON_OFF = AQUARIUM.replace('"self-tuning-mv"', '"on-off"').replace("reference_time_s", "#")
+ON_OFF = AQUARIUM.replace('"adaptive"', '"on-off"').replace("calmness", "#")
 ORDERS = "\n[loops.tank.orders]\n"
 
 

@@ -112,7 +112,7 @@ def test_a_sensor_that_opens_three_times_in_ten_minutes_latches() -> None:
 def test_a_spike_below_the_hard_limit_is_counted_and_hardly_moves_the_output(
     spike_k: float,
 ) -> None:
-    tank = Tank(trip_above_c=95.0)
+    tank = Tank(settled_s=300, trip_above_c=95.0)
     before = tank.last.step.command.power
     tank.board.disturb("spike", spike_k)
     tank.run(2)

@@ -17,6 +17,7 @@ from thermoctl.app.parts import reach_c, sensor_for
 from thermoctl.app.settings import settings_in
 from thermoctl.app.tables import SensorTable
 from thermoctl.app.toml_text import toml_value
+from thermoctl.control.adaptive import Adaptive
 from thermoctl.errors import Refused
 
 _WATER_J_PER_L_K = 4186.0
@@ -197,8 +198,8 @@ def _loop_lines(answers: Answers) -> list[str]:
         _line("law", "linear" if stage is None else stage.default, "how power becomes drive"),
         "",
         "[loops.tank.controller]",
-        _line("kind", "self-tuning-mv"),
-        _line("reference_time_s", 60.0, "about three lags of element, transport and sensor"),
+        _line("kind", "adaptive", "learns gain, loss and lag by itself"),
+        _line("calmness", Adaptive().calmness, "0.3 is brisk, 1.2 calm"),
         "",
         "[loops.tank.model]",
         _line("structure", "known-gain"),

@@ -193,9 +193,7 @@ class LoopTable(Table):
     sensor: SensorTable | None = None
     actuator: ActuatorTable | None = None
     controller: Options = Field(
-        default_factory=lambda: Options.model_validate(
-            {"kind": "self-tuning-mv", "reference_time_s": 60.0}
-        ),
+        default_factory=lambda: Options(kind="adaptive"),
         description="Law in charge in mode auto: a kind, or a table with a kind and its options.",
     )
     shadow: Options | None = Field(

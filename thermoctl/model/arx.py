@@ -50,7 +50,7 @@ class Structure(Protocol):
         ...
 
     def pole(self, theta: Array, P: Array) -> tuple[float | None, float | None]:
-        """Return the pole of a first-order structure and its standard deviation, else None."""
+        """Return the pole of a first-order structure and its sd; None for others."""
         ...
 
 

@@ -99,7 +99,7 @@ class Limits:
         return min(interval_s, self.hold_s)
 
     def jump_for(self, gain: float, gain_sd: float) -> float:
-        """Return `jump_k`, or what a plant of the largest gain that is believed in may do.
+        """Return `jump_k`, or what a plant of the largest gain believed in may do.
 
         That is twice its rise in a period at full power, as long as the gain is two standard
         deviations above its mean. A plant never seen before is thus given its way, while one that

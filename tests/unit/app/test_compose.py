@@ -146,6 +146,7 @@ def test_a_learnt_gain_is_bounded_from_below_unless_the_guards_are_off(minimal):
     tank = minimal["loops"]["tank"]
     tank["model"] = {"structure": "arx", "gain_k_per_s": 0.1}
     tank["period_s"] = 2.0
+    tank["controller"] = "self-tuning-mv"
     assert plan_for(load(minimal).loops["tank"]).controller.gain_min_k == pytest.approx(0.04)
     tank["controller"] = {"kind": "self-tuning-mv", "gain_min_k": 0.01}
     assert plan_for(load(minimal).loops["tank"]).controller.gain_min_k == 0.01

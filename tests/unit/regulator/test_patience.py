@@ -9,6 +9,7 @@ from thermoctl.regulator.judge import Judged, Verdict, judge
 from thermoctl.regulator.limits import Limits
 from thermoctl.signals import Acknowledge, ManualPower, Measurement, Mode, Quality, SetPoint, State
 
+PAPER = {"kind": "self-tuning-mv", "reference_time_s": 60.0}  # knows no holding power at first
 LIMITS = Limits(trip_above_c=60.0, trip_below_c=0.0, setpoint_min_c=5.0, setpoint_max_c=55.0)
 
 
@@ -41,7 +42,7 @@ def test_a_sensor_that_is_mostly_gone_is_safe_within_a_minute_or_two(warm, patte
 
 
 def test_a_hold_at_full_power_is_not_renewed_by_one_reading_in_three(drive_with):
-    cold = drive_with(water_c=25.0)
+    cold = drive_with(water_c=25.0, controller=PAPER)
     assert cold.run(20).command.power == 1.0
     steps = play(cold, "MMG", 60)
     assert [step.state for step in steps].index(State.SAFE) <= 9
@@ -112,12 +113,14 @@ def test_a_second_reading_beyond_the_limit_after_half_a_minute_is_a_first_one_ag
 
 
 @pytest.mark.parametrize("far_s", [1e9, 1e17, 1e300])
-def test_patience_runs_out_wherever_time_has_jumped_to(drive_with, far_s):
-    cold = drive_with(water_c=25.0)
+@pytest.mark.parametrize(("controller", "seconds"), [(PAPER, 5), ("adaptive", 60)])
+def test_patience_runs_out_wherever_time_has_jumped_to(drive_with, far_s, controller, seconds):
+    cold = drive_with(water_c=25.0, controller=controller)
     assert cold.run(20).command.power == 1.0
     cold.see(Measurement(far_s, 25.5))
     cold.see(Measurement(far_s, 25.5))
-    after = [cold.see(Measurement(far_s, quality=Quality.MISSING)) for _ in range(5)]
+    after = [cold.see(Measurement(far_s, quality=Quality.MISSING)) for _ in range(seconds)]
+    assert max([step.command.power for step in after[5:]], default=0.0) < 0.1
     assert after[-1].state is State.SAFE
     assert after[-1].command.power == 0.0
 
@@ -239,7 +242,7 @@ def test_manual_power_may_be_lowered_while_a_reading_is_missing_but_not_raised(w
 
 @pytest.mark.parametrize("value_c", [0.0, 60.0])
 def test_a_set_point_on_the_limit_itself_is_held_or_latched_never_beyond(drive_with, value_c):
-    drive = drive_with(water_c=30.0)
+    drive = drive_with(water_c=30.0, controller=PAPER)
     drive.regulator.request(SetPoint(value_c))
     drive.run(3600)
     assert drive.water_c <= 60.5

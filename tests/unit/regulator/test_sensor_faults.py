@@ -7,6 +7,8 @@ import pytest
 from thermoctl.regulator import Regulator
 from thermoctl.signals import Acknowledge, Alarm, Measurement, Mode, Quality, State
 
+PAPER = {"kind": "self-tuning-mv", "reference_time_s": 60.0}  # knows no holding power at first
+
 
 @pytest.mark.parametrize("quality", [Quality.OPEN, Quality.SHORT])
 def test_a_broken_sensor_circuit_cuts_the_heater_at_once(warm, quality):
@@ -66,12 +68,20 @@ def test_a_ride_alarms_after_five_seconds_and_ends_safe_within_a_minute(warm):
 
 
 def test_before_a_model_is_known_the_last_output_is_held_for_three_seconds(drive_with):
-    cold = drive_with(water_c=25.0)
+    cold = drive_with(water_c=25.0, controller=PAPER)
     assert cold.run(20).command.power == 1.0
     assert cold.step(Quality.MISSING).state is State.HOLD
     seconds = 1 + cold.seconds_to_power_0(Quality.MISSING)
     print(f"sensor missing, model unknown: power 0 after {seconds} s")
     assert seconds <= 3
+
+
+def test_with_the_model_of_a_first_warm_up_a_ride_gives_next_to_nothing(drive_with):
+    cold = drive_with(water_c=25.0, controller="adaptive")
+    assert cold.run(20).command.power == 1.0
+    rides = [cold.step(Quality.MISSING) for _ in range(61)]
+    assert max(step.command.power for step in rides) < 0.1
+    assert (rides[0].state, rides[-1].state) == (State.RIDE, State.SAFE)
 
 
 def test_a_sensor_that_never_answers_never_gets_heat(drive_with):
@@ -81,10 +91,13 @@ def test_a_sensor_that_never_answers_never_gets_heat(drive_with):
     assert drive.steps[-1].state is State.SAFE
 
 
-def test_time_that_stands_still_does_not_stop_the_patience_with_a_lost_sensor(drive_with):
-    cold = drive_with(water_c=25.0)
+@pytest.mark.parametrize(("controller", "seconds"), [(PAPER, 5), ("adaptive", 60)])
+def test_time_that_stands_still_does_not_stop_the_patience_with_a_lost_sensor(
+    drive_with, controller, seconds
+):
+    cold = drive_with(water_c=25.0, controller=controller)
     cold.run(20)
-    stuck = [cold.see(Measurement(cold.t_s, math.nan, Quality.MISSING)) for _ in range(5)]
+    stuck = [cold.see(Measurement(cold.t_s, math.nan, Quality.MISSING)) for _ in range(seconds)]
     assert stuck[-1].state is State.SAFE
 
 
@@ -100,11 +113,14 @@ def test_one_spike_is_ignored_counted_and_hardly_moves_the_output(drive_with, sp
     assert after.state is State.RUN
 
 
-def test_a_jump_of_the_water_is_believed_when_it_repeats(warm):
+@pytest.mark.parametrize(("controller", "readings"), [(PAPER, 3), ("adaptive", 5)])
+def test_a_jump_of_the_water_is_believed_when_it_repeats(drive_with, controller, readings):
+    warm = drive_with(controller=controller)
+    warm.run(300)
     warm.water_c -= 5.0
-    states = [warm.step().state for _ in range(3)]
-    assert states == [State.HOLD, State.HOLD, State.RUN]
-    assert warm.power > 0.5
+    states = [warm.step().state for _ in range(readings)]
+    assert states == [State.HOLD, State.HOLD, *[State.RUN] * (readings - 2)]
+    assert warm.power > 0.5  # the default has a gate of its own, which wants three as well
 
 
 def test_a_spike_across_the_hard_limit_costs_one_cycle_of_power_and_no_latch(warm):

@@ -189,8 +189,17 @@ def _parts(item: Item, label_cells: int, cells: int, *, errors: bool) -> list[Pa
     return head
 
 
-def note(view: View) -> str:
-    """Return what the rule above the panel says at its right."""
+def note(view: View, width: int) -> str:
+    """Return what the rule above the panel says at its right, room permitting."""
+    step = view.step
+    if step is None or step.shadow is None or width < ROOMY:
+        return _how_sure(view)
+    power = numbers.number(None if step.shadow_power is None else 100.0 * step.shadow_power, 0)
+    return f"shadow {step.shadow} {power}{numbers.NBSP}% · {_how_sure(view)}"
+
+
+def _how_sure(view: View) -> str:
+    """Return what an error bar is, and what is wrong with the samples, if anything."""
     white = view.recent.whiteness
     if view.steered and white is not None and white.verdict == "not white":
         return "± is 2σ · not white: model or noise is wrong"

@@ -102,7 +102,7 @@ def render(view: View, width: int, height: int, look: Look) -> list[Text]:
         *charts.deviation(chart, layout.deviation),
         *charts.power(chart, layout.power),
         charts.time_axis(chart),
-        ruled(look, "What it believes", panel.note(view), width),
+        ruled(look, "What it believes", panel.note(view, width), width),
         *panel.beliefs(view, look, width),
         ruled(look, "Events", "", width),
         *_events(view, look, layout.events, width),

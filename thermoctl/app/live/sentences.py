@@ -46,6 +46,10 @@ _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
         ("Back within ±{band_k} after {after_s}", "Back at set point"),
     ),
     "control.settled": (Mark.NONE, ("Settled, overshoot {overshoot_k}", "Settled at set point")),
+    "controller.changed": (
+        Mark.NONE,
+        ("Controller {after}, was {before}", "Controller changed"),
+    ),
     "controller.failed": (
         Mark.ALARM,
         ("Controller failed: {text}", "Controller failed, heater off"),
@@ -76,6 +80,10 @@ _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
     ),
     "sensor.stale": (Mark.WARNING, ("Old sample: {text}", "Old sample")),
     "setpoint.changed": (Mark.NONE, ("Set point {after_c}, was {before_c}", "Set point changed")),
+    "shadow.failed": (
+        Mark.WARNING,
+        ("Shadow {controller} failed and was dropped: {text}", "Shadow failed and was dropped"),
+    ),
     "sim.disturbed": (Mark.NONE, ("{text}", "Plant disturbed")),
     "state.changed": (
         Mark.NONE,

@@ -81,7 +81,7 @@ class Adaptive:
         An argument is outside its range.
     """
 
-    calmness: float = 0.6
+    calmness: float = 0.7
     period_s: float = 1.0
     action: Literal["heat", "cool"] = "heat"
     bank: Bank = field(init=False, repr=False, compare=False)
@@ -135,7 +135,7 @@ class Adaptive:
         return belief, power_for(outlook, r_c, self.calmness, self.period_s, bounds)
 
     def surprise_k(self, belief: AdaptiveBelief, situation: Situation) -> float:
-        """Return reading minus what all hypotheses together expected; NaN beyond one period."""
+        """Return reading minus what the hypotheses expected; NaN beyond one period."""
         bank = belief.bank
         periods = (belief.behind_s + situation.interval_s) / self.period_s
         if bank.block is None or belief.since_s > 0.0 or not 0.5 <= periods < 1.5:
@@ -145,14 +145,14 @@ class Adaptive:
         return self._sign * situation.measured_c - float(bank.weights.share.dot(expected))
 
     def beliefs(self, belief: AdaptiveBelief, situation: Situation) -> Beliefs:
-        """Return gain with its error, and holding power once it is known to .05."""
+        """Return gain with its error, lag, and holding power once it is known to .05."""
         bank, outlook = belief.bank, belief.bank.outlook
         if outlook is None:
             return Beliefs()
         rate, rate_sd = gain(self.bank, bank)
         known = holding_power_sd(bank) <= HOLDING_SD_MAX
         holding_power = outlook.holding_power if known else None
-        return Beliefs(self._sign * rate, rate_sd, holding_power=holding_power)
+        return Beliefs(self._sign * rate, rate_sd, holding_power=holding_power, lag_s=outlook.lag_s)
 
     def plant(self, belief: AdaptiveBelief) -> PlantBelief | None:
         """Return everything believed of the plant; None before the first valid reading."""
