@@ -69,7 +69,6 @@ def harmonic_point(
     if not (np.isfinite(y).all() and t_s[-1] > 0.0):
         return None
     omega = 2.0 * math.pi / float(t_s[-1])
-    y = y - y[0] - (y[-1] - y[0]) * t_s / t_s[-1]  # what drifts is no part of the swing
     given = _of_steps(t_s, np.array([piece.power for piece in stretch.pieces]), omega)
     if not 2.0 * abs(given) / t_s[-1] >= swing_min:
         return None
@@ -83,7 +82,10 @@ def _of_steps(t_s: Array, levels: Array, omega: float) -> complex:
 
 
 def _of_lines(t_s: Array, y: Array, omega: float) -> complex:
-    """Return the harmonic of straight lines from 0 to 0, by parts from that of their slopes."""
+    """Return the harmonic of straight lines over a cycle, by parts from that of their slopes.
+
+    A drift is the same slope all the time, and drops out.
+    """
     return _of_steps(t_s, np.diff(y) / np.diff(t_s), omega) / (1j * omega)
 
 

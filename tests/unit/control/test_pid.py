@@ -168,6 +168,25 @@ def test_an_integral_above_what_somebody_allows_comes_down_to_it():
     assert loop.asked == pytest.approx(0.2, abs=0.011)
 
 
+def test_an_integral_below_what_somebody_insists_on_comes_up_to_it():
+    loop = Loop(fixed(), low=0.3)
+    loop.watch(SETPOINT_C, 0.1)
+    loop.watch(SETPOINT_C, 0.1)
+    for _ in range(1500):
+        loop.sample(SETPOINT_C)
+    assert loop.asked == pytest.approx(0.3, abs=0.011)
+
+
+def test_a_debt_from_taking_over_far_away_is_paid_on_the_way_and_no_more():
+    loop = Loop(fixed())
+    for _ in range(2):
+        loop.watch(30.0, 0.0)
+    for _ in range(1000):
+        loop.sample(30.0)
+    assert loop.applied == 1.0
+    assert loop.sample(SETPOINT_C) == pytest.approx(0.0, abs=1e-9)
+
+
 # -- bumpless --------------------------------------------------------------------------------------
 
 

@@ -10,6 +10,7 @@ import pytest
 from thermoctl.control.pid import Pid
 from thermoctl.control.relay import RelayTest, harmonic_point, integrating_plant, limit_of
 from thermoctl.control.simc import Gains, Limit, Process, tyreus_luyben
+from thermoctl.control.step_test import Found
 from thermoctl.control.stretch import Piece, Stretch
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
@@ -217,6 +218,25 @@ def test_the_limit_is_where_the_loop_comes_back_upside_down(lags_s):
 
 def test_a_response_ahead_of_an_integrator_is_that_of_no_such_plant():
     assert integrating_plant(0.1, 0.5 + 0.0j) is None
+
+
+@pytest.mark.parametrize(("growth", "finds"), [(1.0, True), (1.2, False)])
+def test_cycles_are_judged_when_they_are_alike(growth, finds):
+    test, run, power, t_s, told = RelayTest(False, 0.25, 1.0), None, 0.0, 0, None
+    for cycle in range(8):
+        length = round(40 * growth**cycle)
+        for k in range(length):
+            reading_c = SETPOINT_C - 0.3 * math.sin(2.0 * math.pi * k / length)
+            situation = Situation(float(t_s), 1.0, reading_c, SETPOINT_C, power, start(1),
+                                  NO_PAST, NO_PAST, reading_c)  # fmt: skip
+            run = test.observe(run, situation) if run else test.begin(situation)
+            told = test.decide(run, situation)
+            if not isinstance(told, tuple):
+                break
+            (run, power), t_s = told, t_s + 1
+        if not isinstance(told, tuple):
+            break
+    assert isinstance(told, Found) is finds
 
 
 def test_somebody_elses_regulation_is_no_swing():
