@@ -35,7 +35,7 @@ def bench():
 
 
 def test_a_granted_request_is_settled_once_the_cycle_that_shows_it_is_published(bench):
-    loop, cycles = bench
+    loop, _ = bench
     asked = loop.ask(SetPoint(40.0), "tank")
     seen = []
     loop._publish = lambda cycle: seen.append((asked.settled, cycle.step.setpoint_c))
