@@ -58,7 +58,8 @@ class Steering:
             told = mind.controller.beliefs(mind.belief, situation)
             pole = otherwise if told.a is None else told
             holding = otherwise if told.holding_power is None else told
-            return Beliefs(told.gain, told.gain_sd, pole.a, pole.a_sd, holding.holding_power)
+            power = holding.holding_power
+            return Beliefs(told.gain, told.gain_sd, pole.a, pole.a_sd, power, told.lag_s)
 
         return self._guard.call(beliefs, Beliefs(), _FAILED, situation.t_s)
 
