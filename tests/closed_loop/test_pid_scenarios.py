@@ -14,7 +14,7 @@ from thermoctl.app.compose import loop_for
 from thermoctl.app.settings import load
 from thermoctl.app.sim import bench_settings
 from thermoctl.runtime.clock import SimulatedClock
-from thermoctl.signals import ManualPower, Mode, SetPoint, State
+from thermoctl.signals import ChooseController, ManualPower, Mode, SetPoint, State
 
 AQUARIUM = Path(__file__).parents[2] / "config" / "aquarium.toml"
 BOUND_MK = 9.6
@@ -115,6 +115,24 @@ def test_it_takes_over_from_a_person_without_a_bump(power):
     given = powers(play(1100, events))
     assert given[999] == pytest.approx(power, abs=0.01)
     assert given[1000] == pytest.approx(power, abs=0.06)
+
+
+def test_in_the_shadow_it_learns_from_who_steers_and_takes_over_without_a_bump():
+    document = load(AQUARIUM).model_dump()
+    document["loops"]["tank"].update(controller={"kind": "adaptive"}, shadow={"kind": "pid"})
+    settings, cycles, clock = bench_settings(load(document), 51), [], SimulatedClock()
+    loop = loop_for(settings, clock, cycles.append, beside=False)
+    for t_s in range(3000):
+        clock.sleep_until(t_s)
+        if t_s == 1500:
+            loop.ask(ChooseController("pid"))
+        loop.cycle(t_s)
+    assert loop.shut_down()
+    water_c, power = truth(cycles), powers(cycles)
+    assert told(cycles, "controller.tuned")[0][0] == 1500
+    assert {cycle.step.controller for cycle in cycles[1500:]} == {"pid"}
+    assert power[1500] == pytest.approx(power[1499], abs=0.08)
+    assert water_c[1500:] == pytest.approx(np.full(1500, 37.5), abs=0.1)
 
 
 def test_after_an_hour_without_mains_it_is_back_with_half_a_kelvin_too_much():

@@ -91,8 +91,11 @@ class PidTerms:
 
         What the plant was given is what counts. Where it was less than asked for, an integral that
         would hold more than that relaxes onto it, and a positive error is integrated no further
-        than to where the integral holds nothing. Where it was more, likewise upside down.
+        than to where the integral holds nothing; at the lower end likewise upside down. No limit
+        gives more than was asked for: then somebody else steers, as beside a law in shadow.
         """
+        if applied > max(terms.asked, 0.0) + TOLERANCE:
+            return self.track(terms, setpoint_c, applied)
         gains, offset = self.gains, self._offset(setpoint_c)
         holding = terms.integral - offset
         error_k = setpoint_c - terms.seen_c

@@ -90,11 +90,11 @@ def _of_lines(t_s: Array, y: Array, omega: float) -> complex:
 
 
 def integrating_plant(omega: float, response: complex) -> Process | None:
-    """Return the integrating plant of this response, its lag being half its dead time.
+    """Return the integrating plant of this response; None where none has it.
 
-    One point of a response gives two numbers. With this share the limit beside that point is right
-    within some 10 %, whether there is only dead time or there are mainly lags. None where the
-    response is ahead of an integrator.
+    One point of a response gives two numbers, so its lag is taken to be half its dead time. The
+    limit beside that point is then right within some 10 %, whether there is only dead time or there
+    are mainly lags. A response ahead of an integrator is that of no such plant.
     """
     behind = -cmath.phase(response) % (2.0 * math.pi) - 0.5 * math.pi
     if not 0.0 < behind <= math.pi:

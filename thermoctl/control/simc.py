@@ -1,4 +1,4 @@
-r"""Gains of a PID by rule: SIMC for a plant that is known, Tyreus and Luyben from its limit.
+r"""Gains of a PID by rule: SIMC for a plant, Tyreus and Luyben for its limit.
 
 A plant is a slope, lags and dead time,
 
@@ -20,7 +20,9 @@ from thermoctl.quantities import is_finite_number
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """Gains of a PID in its standard (ISA) form, ``K (e + integral of e/Ti - Td y')``.
+    """Gains of a PID in its standard (ISA) form.
+
+    That is K times the sum of error, integral of error over Ti, and Td times the derivative.
 
     Parameters
     ----------
@@ -147,7 +149,7 @@ class Limit:
 
 
 def tyreus_luyben(limit: Limit, *, derivative: bool = False) -> Gains:
-    """Return the gains Tyreus and Luyben give a PI or a PID, calmer than Ziegler's and Nichols'."""
+    """Return the gains of Tyreus and Luyben for a PI or a PID."""
     if derivative:
         return Gains(limit.gain_per_k / 2.2, 2.2 * limit.period_s, limit.period_s / 6.3)
     return Gains(limit.gain_per_k / 3.2, 2.2 * limit.period_s)

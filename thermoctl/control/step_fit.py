@@ -49,7 +49,10 @@ class StepFit:
 
 
 def step_fit(stretch: Stretch) -> StepFit | None:
-    """Return what fits best; None where power seems to warm nothing, or too little was read."""
+    """Return what fits best, None where nothing does.
+
+    That is where power seems to warm nothing, or with fewer than 8 readings.
+    """
     readings_c = stretch.readings_c()
     read = np.isfinite(readings_c)
     if np.count_nonzero(read) < _READINGS_MIN:

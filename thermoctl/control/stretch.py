@@ -16,7 +16,7 @@ PIECES_MAX = 512
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """One interval: how long it was, the mean power in it, and the temperature at its end.
+    """One interval, with the mean power in it and the temperature at its end.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Intervals one after the other; the reading before the first belongs to none of them.
+    """Intervals one after the other, without the reading before the first.
 
     Parameters
     ----------

@@ -168,13 +168,23 @@ def test_an_integral_above_what_somebody_allows_comes_down_to_it():
     assert loop.asked == pytest.approx(0.2, abs=0.011)
 
 
-def test_an_integral_below_what_somebody_insists_on_comes_up_to_it():
+def test_more_power_than_it_asked_for_is_somebody_elses_and_is_followed():
     loop = Loop(fixed(), low=0.3)
     loop.watch(SETPOINT_C, 0.1)
     loop.watch(SETPOINT_C, 0.1)
-    for _ in range(1500):
-        loop.sample(SETPOINT_C)
-    assert loop.asked == pytest.approx(0.3, abs=0.011)
+    assert loop.sample(SETPOINT_C) == pytest.approx(0.1)
+    assert loop.sample(SETPOINT_C - 0.2) == pytest.approx(0.3)
+
+
+def test_an_hour_too_hot_leaves_the_power_that_holds():
+    loop = Loop(fixed())
+    for _ in range(2):
+        loop.watch(SETPOINT_C, 0.3)
+    loop.sample(SETPOINT_C)
+    for _ in range(3600):
+        loop.sample(45.0)
+    last_of_them = 0.5 * 5.0 / 100.0
+    assert loop.sample(SETPOINT_C) == pytest.approx(0.3 - last_of_them, abs=1e-9)
 
 
 def test_a_debt_from_taking_over_far_away_is_paid_on_the_way_and_no_more():
