@@ -98,9 +98,9 @@ def predicted(block: Block, heat: Array, sensor_step: Array, drift: Drift) -> Bl
     """Return the block one period later: T' = T - d + beta q, z' = z + a (T - z)."""
     after = block.copy()
     _move(after, heat, sensor_step)  # F [P | x]
-    moved = after[:D]
-    _move(moved.swapaxes(0, 1), heat, sensor_step)  # F P F' where both, row and column, move
-    after[D:, :D] = moved[:, D:X].swapaxes(0, 1)  # and by symmetry where one does
+    _move(after[T], heat, sensor_step)  # F P F', row by row where both row and column move
+    _follow(after[Z], sensor_step)
+    after[D:, :D] = after[:D, D:X].swapaxes(0, 1)  # and by symmetry where one does
     after[Z, T] = after[T, Z]  # the one pair whose two ways of rounding differ
     b = np.maximum(block[BETA, X], drift.gain_min)
     b *= b
@@ -113,12 +113,18 @@ def predicted(block: Block, heat: Array, sensor_step: Array, drift: Drift) -> Bl
 
 def _move(rows: Block, heat: Array, sensor_step: Array) -> None:
     """Multiply four rows by F from the left, in place; columns of P likewise by F'."""
+    _follow(rows, sensor_step)
+    water = rows[T]
+    water -= rows[D]
+    water += rows[BETA] * heat
+
+
+def _follow(rows: Block, sensor_step: Array) -> None:
+    """Let the row of the sensor follow that of the water, in place."""
     water, sensor = rows[T], rows[Z]
     towards = water - sensor
     towards *= sensor_step
     sensor += towards
-    water -= rows[D]
-    water += rows[BETA] * heat
 
 
 def inflated(block: Block, nu: float, R: float) -> Block:
