@@ -38,7 +38,7 @@ class _Memory(NamedTuple):
     phi_mean: Array
     spread_squared: float
     parallel: Estimate
-    residuals: tuple[float, ...] = ()
+    residuals: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,7 +156,9 @@ class Guarded:
         if not self.robust_R2 or memory is None or len(memory.residuals) < RESIDUALS_MIN:
             return law
         assert isinstance(law, _WITH_R2)
-        sd = NORMAL_SD * sorted(memory.residuals)[len(memory.residuals) // 2]
+        middle, ranked = len(memory.residuals) // 2, memory.residuals.copy()
+        ranked.partition(middle)
+        sd = NORMAL_SD * ranked.item(middle)
         least = R2_FLOOR * law.R2 if self.R2_min is None else self.R2_min
         R2 = clamp(max(sd * sd, least), 1.0 / LARGEST, LARGEST)
         return law if R2 == law.R2 else replace(law, R2=R2)
@@ -167,15 +169,16 @@ class Guarded:
         if memory is None:
             scale = getattr(self.law, "R2", 1.0)  # least squares counts in units of the noise
             parallel = Estimate(before.theta, frozen(before.P / scale))
-            memory = _Memory(np.array(phi, dtype=np.float64), 0.0, parallel)
+            memory = _Memory(np.array(phi, dtype=np.float64), 0.0, parallel, np.empty(0))
         share = 1.0 / EXCITATION_MEMORY
         step = phi - memory.phi_mean
         spread_squared = (1.0 - share) * (memory.spread_squared + share * float(step.dot(step)))
         parallel, residuals = memory.parallel, memory.residuals
         if self.robust_R2:
             parallel = PARALLEL.update(parallel, phi, y)
-            newest = () if parallel.rejected else (abs(parallel.innovation),)
-            residuals = (*newest, *residuals[: RESIDUALS - 1])
+            residuals = residuals[: RESIDUALS - 1]
+            if not parallel.rejected:
+                residuals = _before(abs(parallel.innovation), residuals)
         step *= share
         step += memory.phi_mean
         return _Memory(frozen(step), spread_squared, parallel, residuals)
@@ -193,3 +196,11 @@ def _adopted(belief: Estimate) -> GuardedEstimate:
         belief.inflation,
         belief.rejected,
     )
+
+
+def _before(newest: float, rest: Array) -> Array:
+    """Return `newest` and after it the `rest`; at once, what concatenating does in three steps."""
+    longer = np.empty(len(rest) + 1)
+    longer[0] = newest
+    longer[1:] = rest
+    return frozen(longer)
