@@ -4,14 +4,28 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+import numpy as np
 import pytest
 
 from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
 from thermoctl.errors import ConfigError, Refused
+from thermoctl.ports import Situation
 from thermoctl.regulator import Regulator
-from thermoctl.signals import Beliefs, ChooseController, ManualPower, Measurement, Mode, State
+from thermoctl.signals import (
+    Beliefs,
+    ChooseController,
+    Estimate,
+    ManualPower,
+    Measurement,
+    Mode,
+    State,
+)
 
+TABLE = {"setpoint_c": 37.5, "trip_above_c": 60.0, "mode": "auto"}
+SITUATION = Situation(
+    0.0, 1.0, 37.5, 37.5, 0.2, Estimate(np.ones(1), np.eye(1)), np.array([37.5]), np.array([0.2])
+)
 PAPER = {"kind": "self-tuning-mv", "reference_time_s": 60.0}
 
 
@@ -59,8 +73,7 @@ class Charge(Rival):
 
 def duel(charge=None, rival=None, **keys):
     """Return a regulator with one controller in charge and one in its shadow."""
-    table = {"setpoint_c": 37.5, "trip_above_c": 60.0, "mode": "auto", **keys}
-    plan = plan_for(load({"loops": {"tank": table}}).loops["tank"])
+    plan = plan_for(load({"loops": {"tank": TABLE | keys}}).loops["tank"])
     return Regulator(replace(plan, controller=charge or Charge(power=0.3), shadow=rival or Rival()))
 
 
@@ -282,6 +295,40 @@ def test_the_pole_of_the_simple_model_is_told_beside_every_controller(drive_with
         told = drive.run(60).beliefs
         assert told.a == pytest.approx(1.0, abs=0.01)
         assert 0.0 < told.a_sd < 0.01
+
+
+@pytest.mark.parametrize(
+    ("interval_s", "told"), [(1.0, True), (1.4, True), (0.4, False), (3.0, False)]
+)
+def test_the_default_foretells_one_period_and_no_other_time(drive_with, interval_s, told):
+    drive = drive_with(controller="adaptive")
+    drive.run(120)
+    mind = drive.regulator._steering.mind
+    belief = mind.belief
+    drive.t_s += interval_s - 1.0
+    drive.step()
+    situation = replace(SITUATION, interval_s=interval_s, measured_c=drive.water_c)
+    assert math.isfinite(mind.controller.surprise_k(belief, situation)) is told
+
+
+def test_the_model_of_a_sample_that_was_not_used_foretells_nothing():
+    law = plan_for(
+        load({"loops": {"tank": TABLE | {"controller": PAPER}}}).loops["tank"]
+    ).controller
+    belief = Estimate(np.ones(1), np.eye(1), innovation=0.3)
+    used = replace(SITUATION, estimate=belief)
+    assert law.surprise_k(law.start(), used) == 0.3
+    unused = replace(SITUATION, estimate=replace(belief, rejected=True))
+    assert math.isnan(law.surprise_k(law.start(), unused))
+
+
+def test_the_model_beside_the_default_is_as_patient_as_the_law_that_may_take_over():
+    plans = [
+        plan_for(load({"loops": {"tank": TABLE | keys}}).loops["tank"])
+        for keys in ({"controller": PAPER}, {"controller": "adaptive", "shadow": PAPER})
+    ]
+    first, second = (plan.identifier.law.covariance_max for plan in plans)
+    assert first == second
 
 
 def test_gain_and_holding_power_are_those_of_the_one_in_charge(drive_with):
