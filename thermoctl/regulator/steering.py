@@ -85,6 +85,8 @@ class Steering:
             return {str(name): str(text) for name, text in told.items()}
 
         self._remarks = self._guard.call(remarks, dict(before), _FAILED, t_s)
+        if not before and not self._remarks:
+            return
         for name in before.keys() - self._remarks.keys():
             self._emit(name, active=False)
         for name, text in self._remarks.items():
