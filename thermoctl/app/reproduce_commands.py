@@ -177,9 +177,13 @@ def _reproduce(study: Study, files: list[Path], as_json: bool) -> None:
         say([f"interrupted: {outcome.replications:,} of {study.replications:,} runs are finished"])
     if not as_json:
         print_outcome(console(), study, outcome)
-    write_figures(files, lambda: study.draw(outcome, files))
-    if as_json:
-        print_json(outcome_json(study, outcome, files))
+    drawn: list[Path] = []
+    try:
+        write_figures(files, lambda: study.draw(outcome, files))
+        drawn = files
+    finally:  # a disk that is full must not cost what was computed
+        if as_json:
+            print_json(outcome_json(study, outcome, drawn))
     if not whole:
         click.get_current_context().exit(EXIT_INTERRUPTED)
 

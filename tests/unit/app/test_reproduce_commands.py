@@ -1,7 +1,9 @@
 """``thermoctl reproduce``: one mechanism for every paper, from the first batch to Ctrl-C."""
 
 import builtins
+import errno
 import json
+import os
 from dataclasses import dataclass
 
 import pytest
@@ -57,6 +59,13 @@ class InterruptedAtOnce(Counted):
     stopped_at = 0
 
 
+class Undrawn(Counted):
+    """The disk is full when the page is drawn."""
+
+    def draw(self, outcome, files):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(files[0]))
+
+
 class Forbidden(Counted):
     """Nothing may be computed."""
 
@@ -76,6 +85,7 @@ def papers(monkeypatch, tmp_path):
         "counted": paper(Counted, **{"--control": paper(Control), "--more": paper(Control)}),
         "interrupted": paper(Interrupted),
         "atonce": paper(InterruptedAtOnce),
+        "undrawn": paper(Undrawn),
         "forbidden": paper(Forbidden),
     }
     monkeypatch.setattr(reproduce_commands, "PAPERS", {**PAPERS, **made})
@@ -184,6 +194,14 @@ def test_ctrl_c_before_anything_is_finished_is_a_plain_interruption(reproduce, t
     assert (code, out) == (130, "")
     assert err.splitlines()[-1] == "thermoctl: interrupted"
     assert list((tmp_path / "atonce").iterdir()) == []
+
+
+def test_a_page_that_cannot_be_written_costs_no_numbers(reproduce):
+    code, out, err = reproduce("undrawn", "--json")
+    told = json.loads(out.splitlines()[0])
+    assert code == 1
+    assert (told["replications"], told["table"], told["files"]) == (30, [{"count": 30}], {})
+    assert "undrawn.png: expected a place for a figure, got: No space left on device" in err
 
 
 def test_a_folder_that_cannot_be_made_is_told_before_anything_is_computed(reproduce, tmp_path):
