@@ -238,6 +238,21 @@ def test_the_score_forgets_what_is_longer_ago_than_ten_minutes():
     assert scores[-1].apart == 0.0
 
 
+def test_what_a_power_moved_in_a_break_is_no_travel():
+    @dataclass(frozen=True)
+    class Late(Rival):
+        def decide(self, belief, situation):
+            return belief, 0.9 if situation.t_s < 100.0 else 0.3
+
+    subject, scores = duel(rival=Late()), []
+    for t in range(240):
+        if t in (90, 110):
+            subject.request(Mode.MANUAL if t == 90 else Mode.AUTO)
+        scores.append(see(subject, t).shadow_score)
+    assert scores[-1].span_s == 180.0
+    assert scores[-1].shadow_travel_per_min == 0.0
+
+
 def test_what_the_one_in_charge_did_not_decide_does_not_count():
     subject = duel(mode="manual")
     subject.request(ManualPower(0.9))
