@@ -63,9 +63,11 @@ class Pid:
         b, from 0 to 1: the share of a step of the set point that meets the power at once.
     tuning : str
         ``fixed``: the gains as given. ``simc``: from the first warm-up of 3 K or more in mode auto.
-        ``relay``: from a swing about the set point.
+        ``relay``: from a swing about the set point. What is found is told by an event, and kept by
+        whoever writes it here, with ``fixed``.
     tuned_form : str
-        What is tuned: ``pi``, or ``pid``, which is quicker and moves the power far more.
+        What is tuned: ``pi``, or ``pid``, which settles sooner, is no steadier at rest, and moves
+        the power ten times as far.
     tuning_limit_s : float
         How long a test may take; the gains stay as given when it has not ended by then.
     relay_amplitude : float
