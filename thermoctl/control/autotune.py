@@ -6,13 +6,58 @@ Implements section 6 of ``docs/theory.md``.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
-from thermoctl.control.relay import RelayRun, RelayTest
-from thermoctl.control.step_test import Found, GivenUp, StepRun, StepTest
+from thermoctl.control.simc import Gains
 from thermoctl.ports import Situation
 
 FORGOTTEN_S, FORGOTTEN_PERIODS = 30.0, 5.0
 """A test that somebody else steered through for longer than both is forgotten."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a test has come to.
+
+    Parameters
+    ----------
+    gains : Gains
+        The gains to steer with from now on.
+    text : str
+        What they were taken from.
+    slope_k_per_s : float
+        Rise at full power.
+    holding_power : float
+        Power to go on with where there is no error; 0 where that was not seen.
+    """
+
+    gains: Gains
+    text: str
+    slope_k_per_s: float
+    holding_power: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class GivenUp:
+    """A test that came to nothing, and why."""
+
+    text: str
+
+
+class Experiment(Protocol):
+    """A test of the plant: frozen; how far it has come goes in and comes out."""
+
+    def begin(self, situation: Situation) -> Any:
+        """Return the test, begun at this sample; None where it cannot begin."""
+        ...
+
+    def observe(self, run: Any, situation: Situation) -> Any:
+        """Return the test after one more sample, whoever steered."""
+        ...
+
+    def decide(self, run: Any, situation: Situation) -> tuple[Any, float] | Found | GivenUp:
+        """Return the test and the power it asks for, or what it has come to."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,8 +66,8 @@ class Tuning:
 
     Parameters
     ----------
-    run : StepRun or RelayRun or None
-        A test under way.
+    run : object
+        A test under way, None without one.
     elapsed_s : float
         Since it began.
     idle_s : float
@@ -31,7 +76,7 @@ class Tuning:
         What it came to; there is no other test after that.
     """
 
-    run: StepRun | RelayRun | None = None
+    run: Any = None
     elapsed_s: float = 0.0
     idle_s: float = 0.0
     outcome: Found | GivenUp | None = None
@@ -43,7 +88,7 @@ class AutoTune:
 
     Parameters
     ----------
-    test : StepTest or RelayTest
+    test : Experiment
         The test.
     most_s : float
         How long it may last.
@@ -51,7 +96,7 @@ class AutoTune:
         Time between two samples.
     """
 
-    test: StepTest | RelayTest
+    test: Experiment
     most_s: float
     period_s: float
 
@@ -63,7 +108,7 @@ class AutoTune:
         if idle_s > max(FORGOTTEN_S, FORGOTTEN_PERIODS * self.period_s):
             return Tuning()
         elapsed_s = tuning.elapsed_s + situation.interval_s
-        run = self.test.observe(tuning.run, situation)  # type: ignore[arg-type]
+        run = self.test.observe(tuning.run, situation)
         return Tuning(run, elapsed_s, idle_s)
 
     def decide(self, tuning: Tuning, situation: Situation) -> tuple[Tuning, float | None]:
@@ -78,7 +123,7 @@ class AutoTune:
             tuning = Tuning(run)
         if tuning.elapsed_s > self.most_s:
             return Tuning(outcome=GivenUp(f"not finished within {self.most_s:g} s")), None
-        told = self.test.decide(run, situation)  # type: ignore[arg-type]
+        told = self.test.decide(run, situation)
         if isinstance(told, Found | GivenUp):
             return Tuning(outcome=told), None
         after, power = told

@@ -10,11 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
-from thermoctl.control.autotune import AutoTune, Tuning
+from thermoctl.control.autotune import AutoTune, Experiment, Found, GivenUp, Tuning
 from thermoctl.control.pid_terms import PidTerms, Terms
 from thermoctl.control.relay import RelayTest
 from thermoctl.control.simc import Gains
-from thermoctl.control.step_test import Found, GivenUp, StepTest
+from thermoctl.control.step_test import StepTest
 from thermoctl.ports import Situation
 from thermoctl.quantities import is_finite_number
 from thermoctl.signals import Beliefs
@@ -123,7 +123,7 @@ class Pid:
         if self.tuning == "fixed":
             return None
         derivative = self.tuned_form == "pid"
-        test: StepTest | RelayTest = RelayTest(derivative, self.relay_amplitude, self.period_s)
+        test: Experiment = RelayTest(derivative, self.relay_amplitude, self.period_s)
         if self.tuning == "simc":
             test = StepTest(derivative, self.period_s)
         return AutoTune(test, self.tuning_limit_s, self.period_s)
@@ -138,19 +138,14 @@ class Pid:
         if self.autotune is not None:
             tuning = self.autotune.observe(tuning, situation)
         before, interval_s = belief.terms, situation.interval_s
+        setpoint_c, applied = situation.setpoint_c, situation.applied
         terms = law.see(before, situation.temperature_c, interval_s)
-        terms = replace(terms, asked=math.nan)
-        first = math.isnan(before.seen_c)
-        if first or not (math.isfinite(terms.seen_c) and math.isfinite(situation.setpoint_c)):
-            return PidBelief(terms, tuning)
-        in_charge = math.isfinite(before.asked) and interval_s < law.gains.integral_s
-        if in_charge:
-            terms = replace(terms, asked=before.asked)
-            terms = law.integrate(terms, situation.setpoint_c, situation.applied, interval_s)
-            terms = replace(terms, asked=math.nan)
-        else:
-            terms = law.track(terms, situation.setpoint_c, situation.applied)
-        return PidBelief(terms, tuning)
+        known = math.isfinite(before.seen_c) and math.isfinite(setpoint_c)
+        if known and math.isfinite(before.asked) and interval_s < law.gains.integral_s:
+            terms = law.integrate(terms, setpoint_c, applied, interval_s)
+        elif known:
+            terms = law.track(terms, setpoint_c, applied)
+        return PidBelief(replace(terms, asked=math.nan), tuning)
 
     def decide(self, belief: PidBelief, situation: Situation) -> tuple[PidBelief, float]:
         """Return the power of the law or of its test, not bounded; NaN when not known."""

@@ -22,8 +22,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from thermoctl.control.adaptive.evidence import Noise
+from thermoctl.control.autotune import Found, GivenUp
 from thermoctl.control.simc import Limit, Process, tyreus_luyben
-from thermoctl.control.step_test import Found, GivenUp
 from thermoctl.control.stretch import Piece, Stretch
 from thermoctl.ports import Situation
 from thermoctl.quantities import Array, clamp

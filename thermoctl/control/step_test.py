@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from thermoctl.control.simc import Gains, Process, simc
+from thermoctl.control.autotune import Found, GivenUp
+from thermoctl.control.simc import Process, simc
 from thermoctl.control.step_fit import StepFit, step_fit
 from thermoctl.control.stretch import Piece, Stretch
 from thermoctl.ports import Situation
@@ -24,35 +25,6 @@ FIRST_LOOK_PERIODS = 10.0
 NEXT_LOOK = 1.2
 COAST_S, COAST_SHARE = 120.0, 2.0
 """Without power a test lasts at most so long, and so many times as long as with it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """What a test has come to.
-
-    Parameters
-    ----------
-    gains : Gains
-        The gains to steer with from now on.
-    text : str
-        What they were taken from.
-    slope_k_per_s : float
-        Rise at full power.
-    holding_power : float
-        Power to go on with where there is no error; 0 where that was not seen.
-    """
-
-    gains: Gains
-    text: str
-    slope_k_per_s: float
-    holding_power: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class GivenUp:
-    """A test that came to nothing, and why."""
-
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
