@@ -105,7 +105,7 @@ def check_P0(P0: float) -> None:  # noqa: N802 - P0 keeps its letter
 
 
 def check_R2(R2: float, unit: float) -> None:  # noqa: N802 - R2 keeps its letter
-    """Raise `RecordError` unless R2 over `unit` lies within `MOST_R2` and its inverse."""
+    """Raise `RecordError` unless R2 / `unit` lies within `MOST_R2` and its inverse."""
     if not unit / MOST_R2 <= R2 <= unit * MOST_R2:
         raise RecordError(f"expected R2 from {unit / MOST_R2:g} to {unit * MOST_R2:g}, got {R2:g}")
 

@@ -112,7 +112,7 @@ def fit_wide(record: Record, y: Array, u: Array, n: int, reach: int) -> WideMode
 
 
 def samples_needed(n: int, reach: int) -> int:
-    """Return how many samples without a gap the model of these lags takes to be fitted."""
+    """Return how many samples without a gap a fit with these lags takes."""
     return SAMPLES_PER_PARAMETER * (n + reach + 1) + n + reach
 
 
