@@ -6,6 +6,7 @@ and a latch of this one is on the disk before the run is over.
 
 from __future__ import annotations
 
+import math
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -121,7 +122,9 @@ def _bar(name: str) -> Iterator[Callable[[Cycle, float], None]]:
 
         def show(cycle: Cycle, share: float) -> None:
             step = cycle.step
-            words = f"{name} {step.measurement.temperature_c:.1f}, {100 * step.command.power:.0f} %"
+            temperature_c = step.measurement.temperature_c
+            seen = f"{temperature_c:.1f}" if math.isfinite(temperature_c) else "no reading"
+            words = f"{name} {seen}, {100 * step.command.power:.0f} %"
             bar.update(task, completed=share, description=words)
 
         yield show
