@@ -155,7 +155,7 @@ def test_a_setpoint_that_is_no_temperature_is_refused(minimal, value, came):
         ({"sensor": "daq"}, 'sensor: expected a table, got "daq"'),
         ({"sensor": {}}, "sensor.board: is missing"),
         ({"controller": 3}, "controller: expected a table, got 3"),
-        ({"controller": "pid"}, "controller.kind: no controller is called 'pid'"),
+        ({"controller": "mpc"}, "controller.kind: no controller is called 'mpc'"),
         ({"model": {"n": 2.0}}, "model.n: expected a whole number, got 2.0"),
         ({"estimator": {"kind": "ckv"}}, "estimator.kind: no estimator is called 'ckv'; did you"),
         ({"estimator": {"kind": "ckf", "R3": 1}}, "estimator.R3: unknown key; known: R1, R2, infl"),
