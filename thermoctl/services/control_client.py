@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import socket
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -16,6 +17,8 @@ from thermoctl.services.control_protocol import VERSION, asking, error_words
 
 ANSWER_S: Final = 5.0
 """How long a reply may take that needs no cycle of the loop."""
+
+_PAUSE_S: Final = 0.02
 
 
 class ControlClient:
@@ -128,16 +131,36 @@ def _connected(paths: Sequence[Path]) -> socket.socket:
         connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         connection.settimeout(ANSWER_S)
         try:
-            connection.connect(os.fspath(checked(path)))
+            _patiently(connection, checked(path))
         except PermissionError as error:
             connection.close()
             raise NotPermitted(f"expected to be allowed to use {path}; try sudo") from error
-        except (OSError, Unavailable):
+        except BlockingIOError as error:
             connection.close()
+            raise Unavailable(f"expected the daemon at {path} to be less busy") from error
+        except OSError:
+            connection.close()
+        except Unavailable:
+            connection.close()
+            raise
         else:
             return connection
     looked = " or ".join(str(path) for path in paths)
     raise NotRunning(f"expected a running daemon at {looked}, found none")
+
+
+def _patiently(connection: socket.socket, path: Path) -> None:
+    """Connect; while the daemon's queue of newcomers is full, try again."""
+    until_s = time.monotonic() + ANSWER_S
+    while True:
+        try:
+            connection.connect(os.fspath(path))
+        except BlockingIOError:
+            if time.monotonic() > until_s:
+                raise
+            time.sleep(_PAUSE_S)
+        else:
+            return
 
 
 def _gone() -> NotRunning:

@@ -17,6 +17,10 @@ STUCK_S: Final = 5.0
 """A client that takes nothing of what waits for it is let go after this."""
 
 
+GRACE_S: Final = 1.0
+"""How long a client may be silent while others want its place."""
+
+
 class ClientLine:
     """A connection that never blocks, and what waits on either side of it.
 
@@ -99,6 +103,15 @@ class ClientLine:
             return False
         finished = self._last or (self._ended and b"\n" not in self._inbox)
         return finished or now_s - self.heard_s > SILENT_S
+
+    def rudeness(self, now_s: float, *, busy: bool) -> tuple[bool, bool, int, float]:
+        """Return how readily it makes room for others; the greatest goes first.
+
+        Who has closed its side, then who is silent while not `busy`, then who has sent the most
+        that nobody has looked at yet: never who has just come to ask one thing.
+        """
+        silent_s = now_s - self.heard_s
+        return self._ended, not busy and silent_s > GRACE_S, len(self._inbox), silent_s
 
     def close(self) -> None:
         """Let the connection go."""

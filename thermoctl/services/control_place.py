@@ -20,7 +20,7 @@ LONGEST: Final = 107
 """Bytes of a path that the kernel takes: 108 with the zero at its end, see unix(7)."""
 
 _PROBE_S: Final = 0.5
-_WAITING: Final = 16
+_WAITING: Final = 64
 
 
 def own_path(environ: Mapping[str, str] = os.environ) -> Path:

@@ -22,10 +22,13 @@ from thermoctl.services.feed import Feed
 from thermoctl.signals import Cycle
 
 CLIENTS: Final = 16
-"""Clients at once; one more takes the place of the one that has been silent the longest."""
+"""Clients at once; one more takes the place of a silent or a greedy one."""
 
-NEWCOMERS: Final = 4
-"""Clients accepted in a turn, so that each is heard before others could take its place."""
+WATCHERS: Final = 8
+"""Clients that may watch at once, so that those who only ask are never kept out."""
+
+NEWCOMERS: Final = 16
+"""Clients accepted in a turn; more wait for the next one."""
 
 PAUSE_S: Final = 0.02
 """Pause after a turn that served anybody: fifty calls a second and client, and no more."""
@@ -151,18 +154,17 @@ class ControlSocket:
             self._attend(client, lines)
 
     def _admit(self, client: ClientLine) -> None:
-        """Make room for a newcomer, so that silent clients keep nobody out."""
+        """Take a newcomer in and hear it; where all places are taken, somebody makes room."""
         if len(self._clients) >= CLIENTS:
-            idle = [each for each in self._clients if each not in self._watching]
-            idle = [each for each in idle if each not in self._pending]
-            if not idle:
-                expected = f"fewer than {CLIENTS} clients at once"
-                client.say(denied(None, CallError("busy", expected, CLIENTS)))
-                client.send(self._clock_s())
-                client.close()
-                return
-            self._drop(min(idle, key=lambda each: each.heard_s))
+            self._drop(self._rudest())
         self._clients.append(client)
+        self._attend(client, [])
+
+    def _rudest(self) -> ClientLine:
+        """Return who makes room for others; there is one, for fewer watch than there are places."""
+        now_s = self._clock_s()
+        talking = [each for each in self._clients if each not in self._watching]
+        return max(talking, key=lambda each: each.rudeness(now_s, busy=each in self._pending))
 
     def _cycle_for(self, cycle: Cycle) -> tuple[str, Mapping[str, Any]]:
         return cycle.loop, self._answering.record(cycle)
@@ -195,6 +197,8 @@ class ControlSocket:
         call: Call | None = None
         try:
             call = parse(line)
+            if call.do == "watch":
+                self._require_room(client)
             answer = self._answering.answer(call)
         except Exception as error:  # noqa: BLE001 - whatever a call can do, the others are served
             client.say(self._denial(call, error))
@@ -205,6 +209,11 @@ class ControlSocket:
         client.say(granted(call.call_id, answer))
         if call.do == "watch":
             self._watching[client] = call
+
+    def _require_room(self, client: ClientLine) -> None:
+        if client not in self._watching and len(self._watching) >= WATCHERS:
+            expected = f"fewer than {WATCHERS} clients that watch"
+            raise CallError("busy", expected, len(self._watching))
 
     def _answer_later(self, client: ClientLine) -> None:
         call, pending = self._pending[client]

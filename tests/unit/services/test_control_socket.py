@@ -11,7 +11,7 @@ from thermoctl.services.control_client import ControlClient
 from thermoctl.services.control_line import OUTBOX, SILENT_S, STUCK_S
 from thermoctl.services.control_place import ControlPlace
 from thermoctl.services.control_protocol import LONGEST
-from thermoctl.services.control_socket import CLIENTS, ControlSocket
+from thermoctl.services.control_socket import CLIENTS, WATCHERS, ControlSocket
 from thermoctl.testing import ManualClock
 
 STATUS = b'{"v":1,"id":1,"do":"status"}\n'
@@ -223,18 +223,34 @@ def test_a_newcomer_takes_the_place_of_the_longest_silent(house):
     for _ in range(CLIENTS - 1):
         house.clock.advance(0.1)
         house.client()
+    house.clock.advance(0.1)
     newcomer = house.client(STATUS)
     assert replies(newcomer)[0]["ok"] is True
     assert len(house.server._clients) == CLIENTS
     assert ended(first)
 
 
-def test_when_all_places_are_watching_a_newcomer_is_told_so(house):
-    for _ in range(CLIENTS):
+def test_only_some_may_watch_so_that_there_is_always_room_to_ask(house):
+    for _ in range(WATCHERS):
         house.client(b'{"v":1,"do":"watch"}\n')
-    newcomer = house.client()
-    assert error_of(newcomer) == "busy"
-    assert ended(newcomer)
+    assert error_of(house.client(b'{"v":1,"do":"watch"}\n')) == "busy"
+    for _ in range(2 * CLIENTS):
+        assert replies(house.client(STATUS))[0]["ok"] is True
+    assert len(house.server._watching) == WATCHERS
+
+
+def test_while_all_wait_for_the_loop_the_greediest_makes_room(house):
+    house.answers.reply = lambda: None
+    modest = [house.client(STATUS) for _ in range(CLIENTS - 1)]
+    greedy = house.client(STATUS * 50)
+    house.turns()
+    house.answers.reply = {}
+    just_come = house.client()  # has not said anything yet, and may stay
+    assert ended(greedy)
+    just_come.sendall(STATUS)
+    house.turns()
+    assert replies(just_come)[0]["ok"] is True
+    assert len(house.server._pending) == len(modest)
 
 
 def test_clients_that_vanish_at_any_moment_leave_nothing_behind(house, cycle_at):
