@@ -1,0 +1,68 @@
+"""What a tuning tells people: the numbers it found, with their error bars and units."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thermoctl.estimation import Order
+from thermoctl.studies import figure as house
+from thermoctl.studies.excitation import Excitation
+from thermoctl.studies.record import Columns, Record
+from thermoctl.studies.tuning import tune
+from thermoctl.studies.tuning_figure import draw_tuning
+from thermoctl.studies.tuning_words import tuning_lines
+
+PERIOD_S, DELAY = 2.0, 4
+
+
+@pytest.fixture(scope="module")
+def tuning():
+    """A tank that rises by .05 K a sample at full power, four samples after it was given."""
+    rng = np.random.default_rng(6)
+    u, y = np.repeat(rng.choice((0.0, 0.6), 40), 20), np.full(800, 36.0)
+    for t in range(DELAY, len(y)):
+        y[t] = y[t - 1] + 0.05 * u[t - DELAY] - 0.001 * (y[t - 1] - 15.0)
+    y += 0.01 * rng.standard_normal(len(y))
+    record = Record("made", PERIOD_S * np.arange(len(y)), u, y, Columns("y", "u", "t"))
+    return tune(record, [Order(2, 1, DELAY)], 37.5)
+
+
+def row(tuning, name):
+    (text,) = (line for line in tuning_lines(tuning) if line.startswith(name))
+    return text.removeprefix(name).strip()
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "factor"),
+    [
+        ("gain", "gain_k_per_min", 1.0),
+        ("lag", "lag_s", 1.0),
+        ("holding power", "holding_power", 100.0),
+        ("loss", "loss_k_per_min", 1.0),
+    ],
+)
+def test_a_row_has_the_value_and_half_the_width_of_its_bounds(tuning, name, key, factor):
+    bounded = getattr(tuning.words, key)
+    value, spread = map(float, re.match(r"([\d.]+) ± ([\d.]+) ", row(tuning, name)).groups())
+    assert value == pytest.approx(factor * bounded.value, rel=0.05)
+    assert spread == pytest.approx(factor * (bounded.high - bounded.value), rel=0.05)
+
+
+def test_a_dead_time_is_the_delay_but_for_the_sample_every_answer_takes(tuning):
+    assert row(tuning, "dead time") == "6 s in order 2,1,4"
+
+
+def test_the_answer_that_is_drawn_ends_on_gain_and_lag(tuning, monkeypatch):
+    drawn = []
+
+    def keep(figure, path):
+        drawn.extend(line.get_xydata() for line in figure.axes[-1].get_lines())
+        return path
+
+    monkeypatch.setattr(house, "save", keep)
+    signal = Excitation(0.0, 0.6, 35.5, 37.5, 1600.0, PERIOD_S, 0.06, 1)
+    draw_tuning(tuning, signal, [Path("unused.png")])
+    words, model = drawn
+    assert model[-1] == pytest.approx(words[-1], rel=0.1)
