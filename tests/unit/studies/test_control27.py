@@ -12,8 +12,8 @@ from thermoctl.estimation import Identifier
 from thermoctl.model.arx import KnownGain
 from thermoctl.ports import Situation
 from thermoctl.studies import figure as house
-from thermoctl.studies.papers.control27 import SCORED_FROM, Control27
-from thermoctl.studies.papers.control27_loop import METHODS, NOISE_K, SCENARIOS, close_loop
+from thermoctl.studies.papers.control27 import SCORED_FROM, Control27, scores_of
+from thermoctl.studies.papers.control27_loop import METHODS, NOISE_K, SCENARIOS, Loop, close_loop
 from thermoctl.studies.papers.study import generator
 
 KEYS = ["scenario", "method", "mse", "bias", "input_travel", "largest", "mse_a"]
@@ -123,6 +123,19 @@ def test_every_scenario_has_its_three_figures_of_one_length(outcome):
         lines += [drawn[key] for key in ("true", "reference") if key in drawn]
         assert {len(line) for line in lines} == {381}
     json.dumps(outcome.figures, allow_nan=False)
+
+
+def test_scores_are_means_over_the_samples_that_count():
+    scenario, samples = SCENARIOS[0], len(SCENARIOS[0].pole)
+    off = np.where(np.arange(1, samples + 1) < SCORED_FROM, 1e3, 2.0)
+    loop = Loop(
+        (scenario.setpoint + off)[:, None],
+        scenario.setpoint,
+        np.where(np.arange(samples) % 2, -0.5, 0.5)[:, None],
+        (scenario.pole + 0.1 * off)[:, None],
+        np.zeros((samples, 1)),
+    )
+    assert scores_of(loop, scenario)[0] == pytest.approx([4.0, 2.0, 1.0, 2.0, 0.04])
 
 
 def test_figures_and_table_of_one_run_are_the_same_numbers():
