@@ -17,6 +17,7 @@ def regulated(**model):
     (loop,) = content["loops"].values()
     loop["model"] = {"structure": "arx"} | model
     loop["controller"] = {"kind": "self-tuning-mv", "reference_time_s": 60.0}
+    del loop["shadow"]
     loop["estimator"] = {"kind": "ckf", "R1": 1e-8, "R2": 0.1}
     loop["mode"], loop["setpoint_c"] = "auto", SETPOINT_C
     cycles = list(simulate(load(content), 7200.0, seed=2))[3600:]
