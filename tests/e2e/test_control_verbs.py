@@ -101,7 +101,7 @@ def test_a_socket_of_somebody_else_is_exit_77(daemon):
 def test_an_active_alarm_makes_the_check_exit_4(start):
     daemon = start(config=AQUARIUM.replace("initial_c = 25.0", "initial_c = 70.0"))
     daemon.wait_until(
-        lambda: "over_temperature" in verb(daemon, "status").stdout, "status with an alarm"
+        lambda: "latched" in verb(daemon, "get", "state").stdout, "loop that is latched"
     )
     assert verb(daemon, "status", "--check").returncode == 4
     (row,) = told(daemon, "alarms")

@@ -168,6 +168,17 @@ def test_a_pending_answer_holds_up_its_client_and_nobody_else(house):
     assert "slow" in replies(slow)[0]
 
 
+def test_calls_of_one_client_are_answered_one_after_the_other(house):
+    content = []
+    house.answers.reply = lambda: content[0] if content else None
+    client = house.client(STATUS + STATUS.replace(b'"id":1', b'"id":2'))
+    house.turns(3)
+    assert len(house.answers.calls) == 1
+    content.append({"late": 1})
+    house.turns(3)
+    assert [each["id"] for each in replies(client)] == [1, 2]
+
+
 def test_who_watches_is_told_of_every_cycle_from_then_on(house, cycle_at):
     house.server.publish(cycle_at(1.0))
     watcher = house.client(b'{"v":1,"id":5,"do":"watch","loop":"tank"}\n')
@@ -371,3 +382,19 @@ def test_a_place_that_is_taken_is_told_of_once_and_tried_again(tmp_path, monkeyp
     finally:
         server.close()
     assert told.names() == ["socket.unavailable", "socket.opened"]
+
+
+def test_a_socket_that_something_removed_is_opened_again(tmp_path, monkeypatch):
+    monkeypatch.setattr("thermoctl.services.control_socket.RETRY_S", 0.01)
+    told, place = Told(), ControlPlace(tmp_path / "control.sock", 0o600)
+    server = ControlSocket(place, Answers(), told)
+    server.start()
+    try:
+        told.wait_for("socket.opened")
+        place.path.unlink()
+        told.wait_for("socket.opened", 2)
+        with ControlClient(place.path) as client:
+            assert client.ask("status")["fine"] is True
+    finally:
+        server.close()
+    assert told.names() == ["socket.opened", "socket.unavailable", "socket.opened"]
