@@ -14,6 +14,8 @@ Celsius = Annotated[float, Field(ge=-273.15, le=2000.0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Past = Annotated[int, Field(le=10)]
+Delay = Annotated[int, Field(le=120)]
 FirstMode = Literal[Mode.OFF, Mode.MANUAL, Mode.AUTO]
 """What a loop can start in; a program has to be loaded first."""
 
@@ -127,10 +129,10 @@ class ModelTable(Table):
         description="Heating rate at full power; 1,500 W in 8 l gives 0.0449. arx: the first "
         "guess, and a fifth of it the least gain that is believed while the guards are on.",
     )
-    n: int = Field(2, ge=1, le=10, description="arx: how many past temperatures.")
-    m: int = Field(2, ge=1, le=10, description="arx: how many past powers.")
-    delay: int = Field(
-        1, ge=1, le=120, description="arx: samples from a power to its first effect; 1: the next."
+    n: Past = Field(2, ge=1, description="arx: how many past temperatures.")
+    m: Past = Field(2, ge=1, description="arx: how many past powers.")
+    delay: Delay = Field(
+        1, ge=1, description="arx: samples from a power to its first effect; 1: the next."
     )
     centre_c: Celsius = Field(
         20.0, description="arx: temperatures are counted from here; where the plant rests at 0 W."
@@ -148,11 +150,11 @@ class OrdersTable(Table):
     """Table ``[loops.NAME.orders]``: orders weighed beside the loop."""
 
     enabled: bool = Field(True, description="Weigh them; false: as if the table were not there.")
-    candidates: tuple[tuple[int, int, int], ...] | None = Field(
+    candidates: tuple[tuple[Past, Past, Delay], ...] | None = Field(
         None,
         max_length=200,
-        description="Past temperatures, powers and delay of each; the 72 of "
-        "`replay --order auto` when absent.",
+        description="Past temperatures, powers and delay of each, at most 10, 10 and 120; the "
+        "72 of `replay --order auto` when absent.",
     )
 
     @field_validator("candidates")

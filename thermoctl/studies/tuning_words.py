@@ -18,21 +18,26 @@ _REFERENCE_LAGS = 3.0
 
 def tuning_json(tuning: Tuning) -> dict[str, Any]:
     """Return orders, parameters and plant; None for what is not known."""
-    order, score = tuning.order, tuning.score
     return {
         "samples": len(tuning.record.t_s),
         **orders_json(tuning.weighing),
-        "model": {
-            "n": order.n,
-            "m": order.m,
-            "delay": order.delay,
-            "period_s": tuning.record.period_s,
-            "theta": [_finite(value) for value in score.theta],
-            "theta_sd": [_finite(value) for value in score.theta_sd],
-            "rms_error": _finite(score.rms_error),
-            "whiteness_p": _finite(score.whiteness_p),
-        },
+        "model": _model_json(tuning) if tuning.words is not None else None,
         "plant": _plant_json(tuning.words),
+    }
+
+
+def _model_json(tuning: Tuning) -> dict[str, Any]:
+    """Return the order and its parameters."""
+    order, score = tuning.order, tuning.score
+    return {
+        "n": order.n,
+        "m": order.m,
+        "delay": order.delay,
+        "period_s": tuning.record.period_s,
+        "theta": [_finite(value) for value in score.theta],
+        "theta_sd": [_finite(value) for value in score.theta_sd],
+        "rms_error": _finite(score.rms_error),
+        "whiteness_p": _finite(score.whiteness_p),
     }
 
 
@@ -61,8 +66,7 @@ def tuning_lines(tuning: Tuning) -> list[str]:
         *(["Order    given"] if tuning.given else orders_lines(tuning.weighing)),
         "",
         *_plant_lines(tuning),
-        "",
-        *_parameter_lines(tuning),
+        *(["", *_parameter_lines(tuning)] if tuning.words is not None else []),
     ]
     if not tuning.given:
         rows = orders_rows(tuning.weighing)

@@ -188,6 +188,8 @@ def test_a_configuration_names_candidates_or_takes_the_usual_ones():
         ([[1, 1, 1], [1, 1, 1]], "repeats another"),
         ([[0, 0, 1]], "must not both be 0"),
         ([[1, 1]], "candidates"),
+        ([[1, 1, 121]], "120"),
+        ([[11, 1, 1]], "10"),
         ("auto", "candidates"),
     ],
 )

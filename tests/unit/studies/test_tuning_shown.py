@@ -1,6 +1,7 @@
 """What a tuning tells people: the numbers it found, with their error bars and units."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from thermoctl.studies.excitation import Excitation
 from thermoctl.studies.record import Columns, Record
 from thermoctl.studies.tuning import tune
 from thermoctl.studies.tuning_figure import draw_tuning
-from thermoctl.studies.tuning_words import tuning_lines
+from thermoctl.studies.tuning_words import tuning_json, tuning_lines
 
 PERIOD_S, DELAY = 2.0, 4
 
@@ -66,3 +67,10 @@ def test_the_answer_that_is_drawn_ends_on_gain_and_lag(tuning, monkeypatch):
     draw_tuning(tuning, signal, [Path("unused.png")])
     words, model = drawn
     assert model[-1] == pytest.approx(words[-1], rel=0.1)
+
+
+def test_parameters_are_not_told_of_a_plant_that_was_not_heard(tuning):
+    deaf = replace(tuning, words=None)
+    assert tuning_json(tuning)["model"]["n"] == tuning.order.n
+    assert tuning_json(deaf)["model"] is None
+    assert not [line for line in tuning_lines(deaf) if line.startswith("Parameters")]
