@@ -20,6 +20,8 @@ from thermoctl.errors import ConfigError
 from thermoctl.runtime.clock import SimulatedClock
 from thermoctl.signals import ManualPower, Mode, Request, SetPoint, State
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 AQUARIUM = Path(__file__).parents[2] / "config" / "aquarium.toml"
 SETPOINT_C = 37.5
 BAND_K = 0.1
@@ -158,7 +160,6 @@ def test_the_rig_meets_its_figures(row):
     assert met(row) == {}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("row", FLEET, ids=lambda row: row.name)
 def test_so_does_any_other_tank_with_the_same_settings(row):
     assert met(row) == {}

@@ -16,6 +16,8 @@ from thermoctl.app.sim import bench_settings
 from thermoctl.runtime.clock import SimulatedClock
 from thermoctl.signals import State
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 AQUARIUM = Path(__file__).parents[2] / "config" / "aquarium.toml"
 QUICK = {"sensor_lag_s": 2.0, "element_lag_s": 4.0}
 VESSELS = {

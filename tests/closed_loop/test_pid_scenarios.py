@@ -16,6 +16,8 @@ from thermoctl.app.sim import bench_settings
 from thermoctl.runtime.clock import SimulatedClock
 from thermoctl.signals import ChooseController, ManualPower, Mode, SetPoint, State
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 AQUARIUM = Path(__file__).parents[2] / "config" / "aquarium.toml"
 BOUND_MK = 9.6
 

@@ -12,6 +12,8 @@ from thermoctl.studies.papers import bicer2017
 from thermoctl.studies.papers.bicer2017 import Bicer2017, exact_model, table_1
 from thermoctl.studies.papers.study import generator
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 HKT = {
     "Kalman filter": 384.4,
     "Filter 1": 80.9,

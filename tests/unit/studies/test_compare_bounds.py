@@ -22,6 +22,8 @@ from thermoctl.studies.compare.scenarios import SCENARIOS
 from thermoctl.studies.compare.score import measured
 from thermoctl.studies.compare.swift import Known
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 RIG = TankParameters()
 NOMINAL = Plant("rig", 0, RIG)
 
@@ -84,7 +86,6 @@ def test_an_input_that_must_be_quiet_costs_deviation():
         realisable(linear, 1e-9)
 
 
-@pytest.mark.slow
 def test_the_law_that_knows_the_plant_reaches_the_bound_on_the_simulated_tank():
     held = rest(RIG, 37.5)
     linear = linear_tank(RIG, ACQUISITION, held)
@@ -139,7 +140,6 @@ def test_no_controller_arrives_before_the_bound(name, law):
     assert settled_s is None or settled_s > 0.97 * bounds(where, SCENARIOS[name])["settled_s"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_no_controller_is_calmer_than_minimum_variance(seed):
     where, regulation = plant("rig", seed), SCENARIOS["regulation"]

@@ -19,6 +19,8 @@ from thermoctl.studies.compare.run import BOUND, Contender, Job, finished, jobs_
 from thermoctl.studies.compare.scenarios import SCENARIOS, SETPOINT, Happening, Scenario
 from thermoctl.studies.compare.store import Result, Store, StoreError
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 _, TABLE = load(profile("aquarium")).loop()
 PLAN = plan_for(TABLE)
 BRIEF = replace(SCENARIOS["warm-up"], judged_s=20.0)
@@ -245,7 +247,6 @@ def test_bounds_come_once_for_all_controllers():
     assert [job.plant.seed for job in planned] == sorted(job.plant.seed for job in planned)
 
 
-@pytest.mark.slow
 def test_processes_find_what_one_process_finds(tmp_path):
     planned = jobs(Contender("on-off", "one", thermostat), range(2))
     planned += [Job.of(None, plant("rig", 0), SCENARIOS["step"], 1.0)]

@@ -13,6 +13,8 @@ from thermoctl.studies.papers import lainiotis
 from thermoctl.studies.papers.lainiotis import SAMPLES, SPREAD, Lainiotis, Plant, cases, finding
 from thermoctl.studies.papers.study import generator
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 RUNS = 8
 
 
@@ -155,7 +157,6 @@ def test_a_narrow_prior_knows_the_order_and_never_says_so(rows, spread):
     assert spread["AR(2), P0 = 1"]["never"] > 0.85
 
 
-@pytest.mark.slow
 def test_95_percent_ten_samples_running_are_worth_more_than_the_first():
     case = cases()[0]
     first, tenth = [], []

@@ -15,6 +15,8 @@ from thermoctl.studies.record import Columns, Record
 from thermoctl.studies.replay import replay
 from thermoctl.studies.replay_figure import draw_replay
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 PNG = b"\x89PNG\r\n"
 
 
