@@ -18,6 +18,8 @@ from thermoctl.runtime.loop import Loop, Wiring
 from thermoctl.signals import Alarm, Mode, RawSample, State
 from thermoctl.testing import ManualClock, ScriptedBoard
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 COLD, WARM, HOT, OPEN = 600.0, 634.0, 690.0, 1023.0
 """Counts of 1024 at 5 V: 19.8, 36.4 and 63.8 degC, and no sensor."""
 

@@ -16,6 +16,8 @@ from thermoctl.studies.papers.control27 import SCORED_FROM, Control27, scores_of
 from thermoctl.studies.papers.control27_loop import METHODS, NOISE_K, SCENARIOS, Loop, close_loop
 from thermoctl.studies.papers.study import generator
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 KEYS = ["scenario", "method", "mse", "bias", "input_travel", "largest", "mse_a"]
 LAWS = {method.name: method.law for method in METHODS}
 

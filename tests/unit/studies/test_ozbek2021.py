@@ -13,6 +13,8 @@ from thermoctl.studies.papers.ozbek2021 import Ozbek2021, scores_of
 from thermoctl.studies.papers.ozbek2021_methods import METHODS, POLE, outputs
 from thermoctl.studies.papers.study import generator
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 KEYS = [
     "method",
     "mse",
