@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from thermoctl.quantities import Array
-from thermoctl.signals import Beliefs, Estimate, RawSample
+from thermoctl.signals import Beliefs, Estimate, PlantBelief, RawSample
 
 
 class Clock(Protocol):
@@ -214,4 +214,13 @@ class Foretelling(Protocol):
         `belief` is the one before this sample. What was expected may use the power that was
         applied meanwhile, for that is no merit of the law.
         """
+        ...
+
+
+@runtime_checkable
+class Knowing(Protocol):
+    """A controller that can also say what its plant is like; no law has to."""
+
+    def plant(self, belief: Any) -> PlantBelief | None:
+        """Return everything believed of the plant; None while that is nothing."""
         ...

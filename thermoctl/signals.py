@@ -9,7 +9,7 @@ Requests travel the other way, through one queue that is read at the top of a cy
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -152,6 +152,45 @@ class Beliefs:
 
 
 @dataclass(frozen=True, slots=True)
+class PlantBelief:
+    """A plant as its controller sees it after a sample.
+
+    Parameters
+    ----------
+    gain_k_per_s, gain_sd_k_per_s : float
+        Heating rate at full power and its standard deviation; negative where power cools.
+    loss_k_per_s, loss_sd_k_per_s : float
+        How fast the water would cool without power.
+    holding_power, holding_power_sd : float
+        Power that makes up for the loss, as a fraction.
+    lag_s, lag_low_s, lag_high_s : float
+        Total lag from heater to reading: mean, 5 % and 95 % quantile.
+    coasting_c : float
+        Where the water would come to rest with holding power from now on, in degC.
+    noise_sd_k : float
+        Standard deviation of a reading.
+    learning : bool
+        Whether the last sample counted as evidence for or against a lag.
+    jumped : bool
+        Whether the last sample showed the water somewhere else than it could be.
+    """
+
+    gain_k_per_s: float
+    gain_sd_k_per_s: float
+    loss_k_per_s: float
+    loss_sd_k_per_s: float
+    holding_power: float
+    holding_power_sd: float
+    lag_s: float
+    lag_low_s: float
+    lag_high_s: float
+    coasting_c: float
+    noise_sd_k: float
+    learning: bool
+    jumped: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ShadowScore:
     """Two controllers side by side over the last minutes; None where nobody can tell.
 
@@ -235,6 +274,10 @@ class Event:
     fields: Mapping[str, object] = field(default_factory=dict)
 
 
+def _nothing() -> None:
+    """Return what is known of a plant of which nothing is."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
     """Everything the regulator made of one measurement.
@@ -257,6 +300,16 @@ class Step:
     shadow: str | None = None
     shadow_power: float | None = None
     shadow_score: ShadowScore | None = None
+    tell: Callable[[], PlantBelief | None] = field(default=_nothing, repr=False)
+
+    @property
+    def plant(self) -> PlantBelief | None:
+        """What the controller in charge believes of its plant, if it has such words.
+
+        Reckoned when asked for, from a belief that is frozen: whoever asks pays, in any thread, and
+        the loop never does.
+        """
+        return self.tell()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

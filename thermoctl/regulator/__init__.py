@@ -1,6 +1,7 @@
 """One measurement in, one step out: modes, limits, trips, alarms."""
 
 from thermoctl.regulator.limits import Limits
-from thermoctl.regulator.regulator import Plan, Regulator
+from thermoctl.regulator.plan import Plan
+from thermoctl.regulator.regulator import Regulator
 
 __all__ = ["Limits", "Plan", "Regulator"]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
 
-from thermoctl.ports import Situation
+from thermoctl.ports import Controller, Knowing, Situation
 from thermoctl.quantities import clamp, is_finite_number
-from thermoctl.regulator.guard import Guard
+from thermoctl.regulator.guard import Failure, Guard, attempt
 from thermoctl.regulator.mind import Mind
 from thermoctl.regulator.supervisor import Emit
-from thermoctl.signals import Beliefs
+from thermoctl.signals import Beliefs, PlantBelief
 
 _FAILED = "controller.failed"
 
@@ -63,6 +65,11 @@ class Steering:
 
         return self._guard.call(beliefs, Beliefs(), _FAILED, situation.t_s)
 
+    @property
+    def tell(self) -> Callable[[], PlantBelief | None]:
+        """A function that says what is believed of the plant now, whenever it is called."""
+        return partial(_plant, self.mind.controller, self.mind.belief)
+
     def ride_s(self, situation: Situation, beliefs: Beliefs, most_s: float) -> float:
         """Return how long the model may steer without a sensor: 0 until it is known."""
         known = is_finite_number(beliefs.holding_power) and math.isfinite(situation.temperature_c)
@@ -92,3 +99,11 @@ class Steering:
         for name, text in self._remarks.items():
             if name not in before:
                 self._emit(name, active=True, text=text)
+
+
+def _plant(controller: Controller, belief: Any) -> PlantBelief | None:
+    """Return what `controller` says of its plant; None where it cannot, or fails."""
+    if not isinstance(controller, Knowing):
+        return None
+    told = attempt(lambda: controller.plant(belief))
+    return None if isinstance(told, Failure) else told

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermoctl.control.adaptive import Adaptive, PlantBelief
+from thermoctl.control.adaptive import Adaptive
 from thermoctl.control.adaptive.bank import Bank
 from thermoctl.control.adaptive.coasting import power_for
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
+from thermoctl.signals import PlantBelief
 
 NOTHING = start(1)
 EMPTY = np.empty(0)

@@ -202,7 +202,7 @@ def test_an_alarm_that_is_acknowledged_leaves_when_it_is_over(warm):
 
 
 def test_a_latch_of_an_earlier_run_keeps_the_heater_off_from_the_first_step(drive_with):
-    whole = drive_with(water_c=20.0).regulator._plan
+    whole = drive_with(water_c=20.0).regulator.plan
     alarm = Alarm("trip.over_temperature", 9, 1, 0.0, "too hot", latched=True)
     drive = drive_with(water_c=20.0)
     drive.regulator = Regulator(whole, alarm)

@@ -14,7 +14,6 @@ from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.coasting import Outlook, power_for
 from thermoctl.control.adaptive.filters import GAIN_MIN, T, X, Z
 from thermoctl.control.adaptive.plant_belief import (
-    PlantBelief,
     gain,
     holding_power_sd,
     plant_belief,
@@ -23,7 +22,7 @@ from thermoctl.control.lasting import Lasting
 from thermoctl.control.minimum_variance import HOLDING_SD_MAX, RIDE_MAX_S
 from thermoctl.ports import Situation
 from thermoctl.quantities import is_finite_number
-from thermoctl.signals import Beliefs
+from thermoctl.signals import Beliefs, PlantBelief
 
 CALMNESS_MIN, CALMNESS_MAX = 0.1, 10.0
 RIDE_LAGS = 3.0

@@ -6,7 +6,6 @@ Implements section 9 of ``docs/theory.md``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,47 +13,9 @@ from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.filters import BETA, D, X
 from thermoctl.control.adaptive.hypotheses import LAGS
 from thermoctl.quantities import Array
+from thermoctl.signals import PlantBelief
 
 LAG_QUANTILES = (0.05, 0.95)
-
-
-@dataclass(frozen=True, slots=True)
-class PlantBelief:
-    """A plant as the bank sees it after a sample.
-
-    Parameters
-    ----------
-    gain_k_per_s, gain_sd_k_per_s : float
-        Heating rate at full power and its standard deviation; negative where power cools.
-    loss_k_per_s, loss_sd_k_per_s : float
-        How fast the water would cool without power.
-    holding_power, holding_power_sd : float
-        Power that makes up for the loss, as a fraction.
-    lag_s, lag_low_s, lag_high_s : float
-        Total lag from heater to reading: mean, 5 % and 95 % quantile.
-    coasting_c : float
-        Where the water would come to rest with holding power from now on, in degC.
-    noise_sd_k : float
-        Standard deviation of a reading.
-    learning : bool
-        Whether the last sample counted as evidence for or against a lag.
-    jumped : bool
-        Whether the last sample showed the water somewhere else than it could be.
-    """
-
-    gain_k_per_s: float
-    gain_sd_k_per_s: float
-    loss_k_per_s: float
-    loss_sd_k_per_s: float
-    holding_power: float
-    holding_power_sd: float
-    lag_s: float
-    lag_low_s: float
-    lag_high_s: float
-    coasting_c: float
-    noise_sd_k: float
-    learning: bool
-    jumped: bool
 
 
 def plant_belief(bank: Bank, belief: BankBelief, sign: float = 1.0) -> PlantBelief | None:

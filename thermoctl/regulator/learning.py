@@ -1,0 +1,101 @@
+"""What is learnt beside every controller, in every mode."""
+
+from __future__ import annotations
+
+import math
+
+from thermoctl.estimation.identifier import Identifier, IdentifierBelief
+from thermoctl.ports import Situation
+from thermoctl.quantities import Array
+from thermoctl.regulator.guard import Guard
+from thermoctl.regulator.holding import Holding
+from thermoctl.regulator.supervisor import Supervisor
+from thermoctl.signals import Beliefs, Estimate
+
+_FAILED = "estimator.failed"
+
+
+class Learning:
+    """Keeps the model of a loop and the power that holds it.
+
+    Parameters
+    ----------
+    identifier : Identifier
+        The law.
+    supervisor : Supervisor
+        Who is told of a belief that is not finite.
+    guard : Guard
+        What stands between the law and the loop.
+    """
+
+    def __init__(self, identifier: Identifier, supervisor: Supervisor, guard: Guard) -> None:
+        self._identifier = identifier
+        self._supervisor = supervisor
+        self._guard = guard
+        self._belief: IdentifierBelief = identifier.start()
+        self._foreseen: IdentifierBelief | None = None
+        self._holding = Holding()
+
+    @property
+    def estimate(self) -> Estimate:
+        """What is believed of the parameters."""
+        return self._belief.estimate
+
+    def observe(self, temperature_c: float, applied: float, t_s: float) -> None:
+        """Learn from the sample; a belief that is not finite is never kept.
+
+        Without a reading, what the model foresees is kept beside the belief, for RIDE to act on.
+        """
+        before, identifier = self._belief, self._identifier
+        seen = not math.isnan(temperature_c)
+        last = before if self._foreseen is None else self._foreseen
+
+        def learn() -> tuple[IdentifierBelief, IdentifierBelief | None, bool]:
+            foreseen = None if seen else identifier.foresee(last, applied)
+            after = identifier.update(before, temperature_c, applied)
+            estimate = after.estimate
+            return after, foreseen, _all_finite(estimate.theta) and _all_finite(estimate.P)
+
+        kept: tuple[IdentifierBelief, IdentifierBelief | None, bool] = (before, None, True)
+        after, self._foreseen, finite = self._guard.call(learn, kept, _FAILED, t_s)
+        if finite:
+            self._belief = after
+        else:
+            text = "expected finite parameters, went back to the last good ones"
+            self._supervisor.fail("estimator.reset", 11, text, t_s)
+
+    def hold(self, deviation_k: float, applied: float, seen_s: float) -> None:
+        """Note which power was `applied` while the plant was held, or not."""
+        self._holding = self._holding.after(deviation_k, applied, seen_s)
+
+    def situation(
+        self, t_s: float, interval_s: float, measured_c: float, setpoint_c: float, applied: float
+    ) -> Situation:
+        """Return what controllers may know of this sample."""
+        known = self._belief if self._foreseen is None else self._foreseen
+        return Situation(
+            t_s,
+            interval_s,
+            float(known.y_past_c[0]),
+            setpoint_c,
+            applied,
+            known.estimate,
+            known.y_past_c,
+            known.u_past,
+            measured_c,
+        )
+
+    def beliefs(self, t_s: float) -> Beliefs:
+        """Return what is known beside every controller: the pole, and the power seen to hold."""
+        estimate, structure = self._belief.estimate, self._identifier.structure
+
+        def beliefs() -> Beliefs:
+            a, a_sd = structure.pole(estimate.theta, estimate.P)
+            return Beliefs(a=a, a_sd=a_sd, holding_power=self._holding.known)
+
+        return self._guard.call(beliefs, Beliefs(), _FAILED, t_s)
+
+
+def _all_finite(values: Array) -> bool:
+    """Return whether every number is finite; plain floats, which add up without a warning."""
+    return math.isfinite(sum(values.ravel().tolist()))

@@ -1,0 +1,53 @@
+"""What the operator wants of a loop: a mode, a set point, and a power for mode manual."""
+
+from __future__ import annotations
+
+from thermoctl.errors import Refused
+from thermoctl.regulator.limits import Limits, accept_power
+from thermoctl.regulator.supervisor import Emit
+from thermoctl.signals import Mode
+
+
+class Wishes:
+    """Keeps what was granted; a wish that is refused changes nothing.
+
+    Parameters
+    ----------
+    limits : Limits
+        Which set points are accepted.
+    setpoint_c : float
+        Set point at the start, in degC.
+    mode : Mode
+        Mode at the start.
+    emit : callable
+        Called as ``emit(name, **fields)`` for every change.
+    """
+
+    def __init__(self, limits: Limits, setpoint_c: float, mode: Mode, emit: Emit) -> None:
+        self._limits = limits
+        self._emit = emit
+        self.setpoint_c = limits.accept_setpoint(setpoint_c)
+        self.mode = mode
+        self.manual_power = 0.0
+
+    def want_mode(self, mode: Mode, given: float) -> None:
+        """Go to `mode`, while the power `given` is taken; manual goes on with it, bumpless."""
+        if mode is Mode.PROGRAM:
+            raise Refused("expected off, manual or auto: this loop has no program")
+        if mode is self.mode:
+            return
+        if mode is Mode.MANUAL:
+            self.manual_power = given
+        self._emit("mode.changed", before=self.mode.value, after=mode.value)
+        self.mode = mode
+
+    def want_setpoint(self, value_c: float) -> None:
+        """Hold `value_c`, in degC."""
+        accepted_c = self._limits.accept_setpoint(value_c)
+        if accepted_c != self.setpoint_c:
+            self._emit("setpoint.changed", before_c=self.setpoint_c, after_c=accepted_c)
+        self.setpoint_c = accepted_c
+
+    def want_power(self, power: float) -> None:
+        """Give `power`, a fraction in [0, 1], in mode manual."""
+        self.manual_power = accept_power(power)
