@@ -86,7 +86,7 @@ class Learning:
         )
 
     def beliefs(self, t_s: float) -> Beliefs:
-        """Return what is known beside every controller: the pole, and the power seen to hold."""
+        """Return what is known beside any controller: the pole, and the holding power."""
         estimate, structure = self._belief.estimate, self._identifier.structure
 
         def beliefs() -> Beliefs:

@@ -1,4 +1,4 @@
-"""What the operator wants of a loop: a mode, a set point, and a power for mode manual."""
+"""What the operator wants: a mode, a set point, and a power for mode manual."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Wishes:
         self.manual_power = 0.0
 
     def want_mode(self, mode: Mode, given: float) -> None:
-        """Go to `mode`, while the power `given` is taken; manual goes on with it, bumpless."""
+        """Go to `mode`, while the power `given` is taken; manual goes on with it."""
         if mode is Mode.PROGRAM:
             raise Refused("expected off, manual or auto: this loop has no program")
         if mode is self.mode:
