@@ -15,9 +15,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from thermoctl.errors import BoardConfigError, LinkError, Refused
+from thermoctl.model.sensor import LM335
 from thermoctl.plant.acquisition import Acquisition, AcquisitionParameters
 from thermoctl.plant.disturbances import disturb
-from thermoctl.plant.parameters import TankParameters
+from thermoctl.plant.parameters import Cooler, TankParameters
 from thermoctl.plant.power_stage import STAGES
 from thermoctl.plant.tank import Tank
 from thermoctl.plant.tolerances import specimen
@@ -27,7 +28,9 @@ from thermoctl.signals import RawSample
 from thermoctl_drivers.outputs import commanded
 
 INPUT = "temperature"
+ELEMENT = "element"
 OUTPUT = "heater"
+COOLER = "cooler"
 MAINS_PERIODS_A_BURST = 2
 
 
@@ -48,6 +51,13 @@ class SimulatedSettings(BaseModel):
         description="Ice around the tank, in kg; 0: it stands in air; left out: as the rig has.",
     )
     element_lag_s: float = Field(13.5, ge=2.0, le=120.0, description="Lag of the heater, in s.")
+    cooler_w: float = Field(
+        0.0, ge=0.0, le=5000.0, description="Heat an output `cooler` takes out, in W; 0: none."
+    )
+    cooler_lag_s: float = Field(20.0, ge=2.0, le=120.0, description="Lag of the cooler, in s.")
+    element_sensor: bool = Field(
+        False, description="Whether an LM335 on the heater is there, as input `element`."
+    )
     transport_s: float | None = Field(
         None,
         ge=0.0,
@@ -77,10 +87,11 @@ class SimulatedSettings(BaseModel):
 
 
 class SimulatedBoard:
-    """One input and one output on a simulated tank; a `Board` that is `Simulated`.
+    """Inputs and outputs on a simulated tank; a `Board` that is `Simulated`.
 
-    The input ``temperature`` is the sum of a burst of conversions of an LM335. The output
-    ``heater`` is the drive of the power stage, a fraction in [0, 1].
+    The input ``temperature`` is the sum of a burst of conversions of an LM335, and so is
+    ``element``, where the heater has a sensor of its own. The output ``heater`` is the drive of the
+    power stage, a fraction in [0, 1]; where there is a cooler, ``cooler`` is the share of its heat.
 
     Parameters
     ----------
@@ -102,7 +113,8 @@ class SimulatedBoard:
 
     def __init__(self, settings: SimulatedSettings, link: Link | None, clock: Clock) -> None:
         del link  # every driver is built alike; this one has nothing to talk to
-        tank_rng, specimen_rng, input_rng = np.random.default_rng(settings.seed).spawn(3)
+        rngs = np.random.default_rng(settings.seed).spawn(4)
+        tank_rng, specimen_rng, input_rng, element_rng = rngs
         try:
             parameters = specimen(_tank_parameters(settings), specimen_rng, settings.tolerances)
             acquisition = _acquisition_parameters(settings)
@@ -111,11 +123,12 @@ class SimulatedBoard:
         self._settings, self._clock = settings, clock
         self._tank = Tank(parameters, tank_rng, STAGES[settings.power_stage])
         self._acquisition = Acquisition(acquisition, input_rng)
+        self._element = Acquisition(acquisition, element_rng) if settings.element_sensor else None
         self._full_scale = float(acquisition.full_scale)
         self._drive_steps = 2**settings.dac_bits - 1
         self._is_open = False
         self._now_s = math.nan
-        self._drive = 0.0
+        self._drives = {OUTPUT: 0.0, COOLER: 0.0} if settings.cooler_w > 0.0 else {OUTPUT: 0.0}
         self._armed_until_s = -math.inf
         self._sequence = 0
         self._last_good_s: float | None = None
@@ -123,14 +136,14 @@ class SimulatedBoard:
         self._counters = {"reads": 0, "writes": 0, "no_sample": 0, "dead_man": 0}
 
     def open(self, deadline_s: float) -> Identity:
-        """Switch the heater off and identify the board; at once, whatever `deadline_s`."""
+        """Switch everything off and identify the board; at once, whatever `deadline_s`."""
         del deadline_s
         now_s = self._clock.now_s()
         if math.isnan(self._now_s):
             self._now_s = now_s  # the tank's life begins here
         self._is_open = True
         self._catch_up()
-        self._drive = 0.0
+        self._switch_off()
         size = f"{self._settings.volume_l:g} l, {self._settings.heater_w:g} W"
         return Identity(kind="simulated", name=size, version=str(self._settings.seed))
 
@@ -145,27 +158,36 @@ class SimulatedBoard:
         del deadline_s  # answers at once
         self._catch_up()
         self._counters["reads"] += 1
+        self._sequence += 1
+        samples = {}
         volts = self._tank.probe.volts()
         self._missing = math.isnan(volts)
         if self._missing:
             self._counters["no_sample"] += 1
-            return {}
-        self._sequence += 1
-        self._last_good_s = self._now_s
-        counts = self._acquisition.convert(volts)
-        return {INPUT: RawSample(self._now_s, float(counts), self._full_scale, self._sequence)}
+        else:
+            self._last_good_s = self._now_s
+            samples[INPUT] = self._sample(self._acquisition, volts)
+        if self._element is not None:
+            element_v = LM335.volts(self._tank.temperatures.element_c)
+            samples[ELEMENT] = self._sample(self._element, element_v)
+        return samples
+
+    def _sample(self, acquisition: Acquisition, volts: float) -> RawSample:
+        counts = float(acquisition.convert(volts))
+        return RawSample(self._now_s, counts, self._full_scale, self._sequence)
 
     def write(
         self, outputs: Mapping[str, float], valid_for_s: float, deadline_s: float
     ) -> Mapping[str, float]:
-        """Set the drive, re-arm the dead-man, and return what the D/A converter took.
+        """Set the drives, re-arm the dead-man, and return what the D/A converters took.
 
         Parameters
         ----------
         outputs : mapping
-            ``heater``: drive in [0, 1]; what lies outside is limited, and NaN is 0.
+            Drives in [0, 1] of ``heater`` and ``cooler``; what lies outside is limited, and NaN
+            is 0.
         valid_for_s : float
-            The heater goes off after this or after ``dead_man_s``, whichever comes first.
+            Everything goes off after this or after ``dead_man_s``, whichever comes first.
         deadline_s : float
             Not used; the board takes the drive at once.
 
@@ -176,22 +198,27 @@ class SimulatedBoard:
         BoardConfigError
             When there is no such output; nothing is changed.
         FaultError
-            When the drive or the time is infinite or no number; the heater is off then.
+            When a drive or the time is infinite or no number; everything is off then.
         """
         del deadline_s
         for name in outputs:
-            if name != OUTPUT:
-                raise BoardConfigError(f"output must be {OUTPUT!r}, got {name!r}")
+            if name not in self._drives:
+                known = " or ".join(repr(each) for each in self._drives)
+                raise BoardConfigError(f"output must be {known}, got {name!r}")
         self._catch_up()
         self._counters["writes"] += 1
-        if OUTPUT in outputs:
-            self._drive = 0.0  # and so it stays when what is asked is no command
-            wished, held_s = commanded(
-                OUTPUT, outputs[OUTPUT], valid_for_s, self._settings.dead_man_s
-            )
-            self._drive = round(wished * self._drive_steps) / self._drive_steps
+        before, steps = dict(self._drives), self._drive_steps
+        if outputs:
+            self._switch_off()  # and so it stays when what is asked is no command
+        for name, drive in outputs.items():
+            wished, held_s = commanded(name, drive, valid_for_s, self._settings.dead_man_s)
+            before[name] = round(wished * steps) / steps
             self._armed_until_s = self._now_s + held_s
-        return {OUTPUT: self._drive}
+        self._drives = before
+        return dict(before)
+
+    def _switch_off(self) -> None:
+        self._drives = dict.fromkeys(self._drives, 0.0)
 
     def health(self) -> Health:
         """Return counters; ``degraded`` without a sensor, ``down`` when closed."""
@@ -201,10 +228,10 @@ class SimulatedBoard:
         return Health(status, dict(self._counters), self._last_good_s, error)
 
     def close(self) -> None:
-        """Switch the heater off and let go; the tank lives on and may be opened again."""
+        """Switch everything off and let go; the tank lives on and may be opened again."""
         if self._is_open:
             self._catch_up()
-        self._drive = 0.0
+        self._switch_off()
         self._is_open = False
 
     def truth(self) -> Mapping[str, float]:
@@ -217,6 +244,7 @@ class SimulatedBoard:
             "element_c": temperatures.element_c,
             "still_c": temperatures.still_c,
             "heater_w": tank.heater_w,
+            "cooled_w": tank.cooled_w,
             "ice_kg": heat.bath_ice_kg + heat.ice_kg,
             "water_kg": heat.water_kg,
             "mains": tank.stage.mains,
@@ -238,7 +266,7 @@ class SimulatedBoard:
             raise Refused(str(error)) from error
 
     def _catch_up(self) -> None:
-        """Let the tank live until now, with the heater off once the dead-man has run out."""
+        """Let the tank live until now, with all off once the dead-man has run out."""
         if not self._is_open:
             raise LinkError("board must be opened first, it is closed")
         now_s = self._clock.now_s()
@@ -246,12 +274,14 @@ class SimulatedBoard:
         if interval_s == 0.0:
             return
         driven_s = clamp(self._armed_until_s - self._now_s, 0.0, interval_s)
-        self._tank.advance(driven_s, self._drive)
+        self._tank.advance(driven_s, self._drives[OUTPUT], self._drives.get(COOLER, 0.0))
         if driven_s < interval_s:
-            self._counters["dead_man"] += self._drive > 0.0
-            self._drive = 0.0
+            self._counters["dead_man"] += any(self._drives.values())
+            self._switch_off()
             self._tank.advance(interval_s - driven_s, 0.0)
         self._acquisition.advance(interval_s)
+        if self._element is not None:
+            self._element.advance(interval_s)
         self._now_s = now_s
 
 
@@ -268,6 +298,7 @@ def _tank_parameters(settings: SimulatedSettings) -> TankParameters:
     return replace(
         scaled,
         element=replace(scaled.element, lag_s=settings.element_lag_s),
+        cooler=Cooler(settings.cooler_w, settings.cooler_lag_s),
         probe=replace(
             scaled.probe,
             lag_s=settings.sensor_lag_s,

@@ -369,4 +369,50 @@ def test_every_setting_says_what_it_is_and_knows_its_bounds():
     for name, entry in SimulatedSettings.model_fields.items():
         if name != "kind":
             assert entry.description, name
-            assert entry.metadata or name == "power_stage", name
+            assert entry.metadata or name in ("power_stage", "element_sensor"), name
+
+
+def test_a_cooler_is_an_output_of_its_own_and_only_where_there_is_one():
+    clock = HandClock()
+    board = board_on(clock, cooler_w=300.0)
+    taken = board.write({"heater": 0.0, "cooler": 0.5}, 2.5, clock.t_s + 0.5)
+    assert taken == {"heater": 0.0, "cooler": pytest.approx(0.5, abs=1e-3)}
+    clock.t_s += 2.0
+    board.read(clock.t_s)
+    assert board.truth()["cooled_w"] > 0.0
+    with pytest.raises(BoardConfigError, match="'heater', got 'cooler'"):
+        board_on(clock).write({"cooler": 0.5}, 2.5, clock.t_s + 0.5)
+
+
+def test_the_dead_man_cuts_the_cooler_as_it_cuts_the_heater():
+    clock = HandClock()
+    board = board_on(clock, cooler_w=300.0, cooler_lag_s=2.0)
+    board.write({"cooler": 1.0}, 2.5, clock.t_s + 0.5)
+    clock.t_s += 30.0
+    board.read(clock.t_s)
+    assert board.truth()["cooled_w"] < 0.1
+    assert board.health().counters["dead_man"] == 1
+
+
+def test_a_write_with_one_bad_drive_leaves_nothing_on():
+    clock = HandClock()
+    board = board_on(clock, cooler_w=300.0)
+    board.write({"heater": 0.5}, 2.5, clock.t_s + 0.5)
+    with pytest.raises(FaultError):
+        board.write({"heater": 0.5, "cooler": math.inf}, 2.5, clock.t_s + 0.5)
+    assert board.write({}, 2.5, clock.t_s + 0.5) == {"heater": 0.0, "cooler": 0.0}
+
+
+def test_the_heater_may_have_a_sensor_and_it_changes_nothing_else():
+    clock, plain = HandClock(), HandClock()
+    board, other = board_on(clock, element_sensor=True), board_on(plain)
+    for _ in range(30):
+        clock.t_s, plain.t_s = clock.t_s + 1.0, plain.t_s + 1.0
+        seen, alone = board.read(clock.t_s), other.read(plain.t_s)
+        assert seen["temperature"] == alone["temperature"]
+        write(board, clock, 0.5)
+        write(other, plain, 0.5)
+    shown_c = LM335_AT_5_V.measure(seen["element"], clock.t_s).temperature_c
+    assert set(alone) == {"temperature"}
+    assert shown_c == pytest.approx(board.truth()["element_c"], abs=0.5)
+    assert shown_c > board.truth()["true_temperature_c"] + 10.0

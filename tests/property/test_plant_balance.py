@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from thermoctl.plant.disturbances import DISTURBANCES, disturb
 from thermoctl.plant.ledger import stored_j, stored_kg
-from thermoctl.plant.parameters import Bath, TankParameters
+from thermoctl.plant.parameters import Bath, Cooler, TankParameters
 from thermoctl.plant.tank import Tank
 
 SIZES = {
@@ -19,6 +19,7 @@ SIZES = {
     "largest": TankParameters.scaled(200.0, 5000.0),
     "sluggish": TankParameters.scaled(200.0, 50.0),
     "in air": replace(TankParameters(), bath=Bath.holding(0.0)),
+    "cooled": replace(TankParameters(), cooler=Cooler(800.0)),
 }
 
 
@@ -36,7 +37,7 @@ def test_the_books_close_over_a_run_with_every_disturbance(size):
         if name == "bath-ice" and not tank.parameters.bath.exists:
             continue
         disturb(tank, name)
-        tank.advance(90.0, 0.5)
+        tank.advance(90.0, 0.5, cooling=0.5)
         assert_books_close(tank)
     assert tank.ledger.electric_j > 0.0
     assert tank.ledger.lost_j != 0.0

@@ -57,8 +57,9 @@ class Ledger:
 
     @property
     def lost_j(self) -> float:
-        """Heat that went to the room, with the vapour and down the drain, in J."""
-        return self._crossed("room_j") + self._crossed("vapour_j") + self._crossed("drained_j")
+        """Heat that went to room, vapour, drain and cooler, in J."""
+        gone = ("room_j", "vapour_j", "drained_j", "cooled_j")
+        return sum(self._crossed(name) for name in gone)
 
     @property
     def error_j(self) -> float:

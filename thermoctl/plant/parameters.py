@@ -146,6 +146,26 @@ class Element:
 
 
 @dataclass(frozen=True, slots=True)
+class Cooler:
+    """A coil in the stirred water that takes heat out; the rig has none.
+
+    Parameters
+    ----------
+    rated_w : float
+        Heat it takes out at full drive, 0 to 5,000 W; 0: there is none.
+    lag_s : float
+        How long it takes to follow its drive, 2 to 120 s.
+    """
+
+    rated_w: float = 0.0
+    lag_s: float = 20.0
+
+    def __post_init__(self) -> None:
+        require("rated_w", self.rated_w, 0.0, 5000.0)
+        require("lag_s", self.lag_s, 2.0, 120.0)
+
+
+@dataclass(frozen=True, slots=True)
 class Bath:
     """The container of ice the tank stands in.
 
@@ -310,6 +330,7 @@ class TankParameters:
     room: Room = field(default_factory=Room)
     probe: Probe = field(default_factory=Probe)
     supply: Supply = field(default_factory=Supply)
+    cooler: Cooler = field(default_factory=Cooler)
     initial_c: float = 25.0
     pour_c: float = 10.0
 

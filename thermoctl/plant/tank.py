@@ -13,6 +13,7 @@ from numpy.random import Generator
 
 from thermoctl.model.actuator import ActuatorLaw, SquareLaw
 from thermoctl.plant import handling, thermal
+from thermoctl.plant.coil import CoolingCoil
 from thermoctl.plant.ledger import Ledger
 from thermoctl.plant.noise import Normals, Wander
 from thermoctl.plant.parameters import WATER_J_PER_KG_K, TankParameters
@@ -21,7 +22,7 @@ from thermoctl.plant.probe import ProbeInTank
 
 
 class Tank:
-    """Two zones of water, glass, ice, a heater with its power stage, and a probe.
+    """Two zones of water, glass, ice, a heater with its power stage, a cooler, a probe.
 
     Parameters
     ----------
@@ -44,7 +45,8 @@ class Tank:
         self._loss = Wander(Normals(loss_rng), supply.loss_spread, supply.loss_s)
         self._start = self._heat = thermal.start(parameters)
         self._t_s = 0.0
-        self._heater_w = 0.0
+        self._heater_w = self._cooled_w = 0.0
+        self._coil = CoolingCoil(parameters.cooler)
         self._stirred = True
         self._draught, self._draught_until_s = 1.0, 0.0
         self._k = thermal.conductances(parameters)
@@ -71,6 +73,11 @@ class Tank:
         return self._heater_w
 
     @property
+    def cooled_w(self) -> float:
+        """Heat that the cooler took out during the last step."""
+        return self._cooled_w
+
+    @property
     def stirred(self) -> bool:
         """Whether the stirrer turns."""
         return self._stirred
@@ -90,7 +97,7 @@ class Tank:
         """The books of energy and mass since the start."""
         return Ledger(self._start, self._heat)
 
-    def advance(self, interval_s: float, drive: float) -> None:
+    def advance(self, interval_s: float, drive: float, cooling: float = 0.0) -> None:
         """Let `interval_s` pass with `drive` on the power stage.
 
         Parameters
@@ -99,6 +106,8 @@ class Tank:
             Time to pass, at least 0 and finite; divided into equal steps of at most 0.5 s.
         drive : float
             Drive in [0, 1]; what lies outside is limited, and NaN is 0.
+        cooling : float
+            Drive of the cooler, likewise; means nothing where there is none.
 
         Raises
         ------
@@ -109,18 +118,28 @@ class Tank:
             raise ValueError(f"interval_s must be at least 0 and finite, got {interval_s!r}")
         steps = math.ceil(interval_s / thermal.LONGEST_STEP_S)
         for _ in range(steps):
-            self._step(interval_s / steps, drive)
+            self._step(interval_s / steps, drive, cooling)
 
-    def _step(self, step_s: float, drive: float) -> None:
+    def _step(self, step_s: float, drive: float, cooling: float) -> None:
         """Advance everything by one step."""
         if self._draught != 1.0 and self._t_s >= self._draught_until_s:
             self.draught(1.0, 0.0)
         self._heater_w = self.stage.advance(step_s, drive)
         unrest = 1.0 + self._loss.advance(step_s)
-        heat = self._heat = thermal.step(self._k, self._heat, self._heater_w, unrest, step_s)
+        if self._coil.exists:
+            self._cooled_w = self._coil.advance(step_s, cooling, self._water_c)
+        self._heat = thermal.step(
+            self._k, self._heat, self._heater_w, unrest, step_s, self._cooled_w
+        )
         self._t_s += step_s
+        self.probe.advance(step_s, self._water_c, stirred=self._stirred)
+
+    @property
+    def _water_c(self) -> float:
+        """Temperature of the stirred zone."""
+        heat = self._heat
         zone_j_per_k = (1.0 - self._k.still_share) * heat.water_kg * WATER_J_PER_KG_K
-        self.probe.advance(step_s, heat.water_j / zone_j_per_k, stirred=self._stirred)
+        return heat.water_j / zone_j_per_k
 
     def stir(self, on: bool) -> None:
         """Start or stop the stirrer."""

@@ -40,6 +40,7 @@ class Heat(NamedTuple):
     room_j: float = 0.0
     vapour_j: float = 0.0
     vapour_kg: float = 0.0
+    cooled_j: float = 0.0
     poured_j: float = 0.0
     poured_kg: float = 0.0
     drained_j: float = 0.0
@@ -192,7 +193,9 @@ def outside(k: Conductances, heat: Heat, wall_c: float, unrest: float) -> Outsid
     return Outside(wall_w, wall_w - room_w - melting_w, room_w, melting_w / FUSION_J_PER_KG)
 
 
-def rates(k: Conductances, heat: Heat, heater_w: float, unrest: float = 1.0) -> Heat:
+def rates(
+    k: Conductances, heat: Heat, heater_w: float, unrest: float = 1.0, cooled_w: float = 0.0
+) -> Heat:
     """Return the rate of change of every entry of `heat`, per second.
 
     Parameters
@@ -205,12 +208,13 @@ def rates(k: Conductances, heat: Heat, heater_w: float, unrest: float = 1.0) -> 
         Electrical power.
     unrest : float
         Factor on the heat that passes from the glass to the bath.
+    cooled_w : float
+        Heat that a cooler takes out of the stirred water.
     """
     zone_j_per_k = heat.water_kg * WATER_J_PER_KG_K
     water_c = heat.water_j / (zone_j_per_k * (1.0 - k.still_share))
     still_c = heat.still_j / (zone_j_per_k * k.still_share)
     wall_c = heat.wall_j / k.wall_j_per_k
-
     heating_w = k.element_w_per_k * (heat.element_j / k.element_j_per_k - water_c)
     level = heat.water_kg / k.nominal_kg  # a stirrer turns over all there is in the same time
     mixing_w = level * k.exchange_w_per_k * (water_c - still_c)
@@ -230,7 +234,7 @@ def rates(k: Conductances, heat: Heat, heater_w: float, unrest: float = 1.0) -> 
     wall_w, bath_w, room_w, bath_melting_kg = outside(k, heat, wall_c, unrest)
     return Heat(  # in the order of its fields: by their names it would take three times as long
         heater_w - heating_w,
-        heating_w - mixing_w - glass_w - surface_w - vapour_w - melting_w - passed_w,  # water_j
+        heating_w - mixing_w - glass_w - surface_w - vapour_w - melting_w - passed_w - cooled_w,
         mixing_w - still_glass_w + passed_w,
         glass_w + still_glass_w - wall_w,
         bath_w,
@@ -242,13 +246,21 @@ def rates(k: Conductances, heat: Heat, heater_w: float, unrest: float = 1.0) -> 
         surface_w + room_w,
         vapour_w,
         vapour_kg,
+        cooled_w,
     )
 
 
-def step(k: Conductances, heat: Heat, heater_w: float, unrest: float, step_s: float) -> Heat:
+def step(
+    k: Conductances,
+    heat: Heat,
+    heater_w: float,
+    unrest: float,
+    step_s: float,
+    cooled_w: float = 0.0,
+) -> Heat:
     """Return the state `step_s` later by the midpoint rule; at most `LONGEST_STEP_S`."""
-    now = rates(k, heat, heater_w, unrest)
+    now = rates(k, heat, heater_w, unrest, cooled_w)
     half_s = 0.5 * step_s  # and half-way only what is stored counts, not what crossed the boundary
     middle = Heat(*[x + half_s * dx for x, dx in zip(heat[:_STORED], now, strict=False)])
-    mean = rates(k, middle, heater_w, unrest)
+    mean = rates(k, middle, heater_w, unrest, cooled_w)
     return Heat(*[x + step_s * dx for x, dx in zip(heat, mean, strict=True)])

@@ -24,6 +24,7 @@ VARIED: Mapping[str, tuple[str, ...]] = {
     "bath": ("melting_w_per_kg_k",),
     "room": ("convection_w_per_m2_k", "radiation_w_per_m2_k"),
     "probe": ("transport_s", "lag_s"),
+    "cooler": ("lag_s",),
 }
 """What varies between specimens; size, rated power and temperatures are what was ordered."""
 
