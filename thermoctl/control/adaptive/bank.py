@@ -60,6 +60,8 @@ class BankBelief:
         The filters; None before the first valid reading.
     outlook : Outlook or None
         What follows for control; None before the first valid reading.
+    prior : Prior
+        Gain and loss to begin with; once there are filters, they know better.
     """
 
     sample: int
@@ -72,6 +74,7 @@ class BankBelief:
     heard: float = 0.0
     block: filters.Block | None = None
     outlook: Outlook | None = None
+    prior: filters.Prior = filters.UNKNOWN
 
 
 class Met(NamedTuple):
@@ -105,7 +108,7 @@ class Bank:
     u_min: float = 0.0
     u_max: float = 1.0
     hypotheses: Hypotheses = field(init=False, repr=False)
-    _drift: filters.Drift = field(init=False, repr=False)
+    drift: filters.Drift = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("u_min", "u_max"):
@@ -116,7 +119,7 @@ class Bank:
         if self.u_max <= 0.0:
             raise ValueError(f"u_max must be positive, got {self.u_max!r}")
         object.__setattr__(self, "hypotheses", Hypotheses.at_period(self.period_s))
-        object.__setattr__(self, "_drift", filters.drift(self.period_s))
+        object.__setattr__(self, "drift", filters.drift(self.period_s))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -162,7 +165,7 @@ class Bank:
         sample, blind = belief.sample + 1, 0 if seen else belief.blind + 1
         block = self._begun(belief, y_c)
         if blind * self.period_s <= BLIND_S:
-            block = filters.predicted(block, way.heat, hypotheses.sensor_step, self._drift)
+            block = filters.predicted(block, way.heat, hypotheses.sensor_step, self.drift)
         met = Met(belief.noise, belief.gate, belief.weights, 0.0, block)
         if seen:
             met = self._met(met, y_c, sample, excitation.share)
@@ -181,7 +184,7 @@ class Bank:
     def _begun(self, belief: BankBelief, y_c: float) -> filters.Block:
         """Return the block to go on from; at the first reading and after a long gap, a new one."""
         if belief.block is None:
-            return filters.start(self.hypotheses, y_c)
+            return filters.start(self.hypotheses, y_c, belief.prior)
         if belief.blind * self.period_s > BLIND_S and math.isfinite(y_c):
             return filters.restarted(belief.block, self.hypotheses, y_c)
         return belief.block

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Literal
 
+from thermoctl.control.adaptive import trial
 from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.coasting import Outlook, power_for
 from thermoctl.control.adaptive.filters import GAIN_MIN, T, X, Z
@@ -18,6 +19,8 @@ from thermoctl.control.adaptive.plant_belief import (
     holding_power_sd,
     plant_belief,
 )
+from thermoctl.control.adaptive.remembered import recalled, remember
+from thermoctl.control.adaptive.trial import Memory
 from thermoctl.control.lasting import Lasting
 from thermoctl.control.minimum_variance import HOLDING_SD_MAX, RIDE_MAX_S
 from thermoctl.ports import Situation
@@ -47,6 +50,8 @@ class AdaptiveBelief:
         Time since its last sample, and the applied power integrated over it.
     doubt : Lasting
         Whether power seems to warm nothing.
+    memory : Memory
+        What has become of a model that was remembered from an earlier run.
     """
 
     bank: BankBelief
@@ -54,6 +59,7 @@ class AdaptiveBelief:
     since_s: float = 0.0
     given_s: float = 0.0
     doubt: Lasting = field(default_factory=Lasting)
+    memory: Memory = field(default_factory=Memory)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,24 +111,46 @@ class Adaptive:
         """Return the belief before the first sample: nothing is known."""
         return AdaptiveBelief(self.bank.start())
 
+    def start_from(self, remembered: Mapping[str, Any], age_s: float) -> AdaptiveBelief:
+        """Return the belief before the first sample, with a model of an earlier run on trial.
+
+        Raises
+        ------
+        ValueError
+            It was learnt with another bank, period or action, or no plant could be like that.
+        """
+        if remembered.get("action") != self.action:
+            raise ValueError(f"expected action {self.action!r}, got {remembered.get('action')!r}")
+        bank = recalled(self.bank, remembered, age_s)
+        rival = replace(self.bank.start(), noise=bank.noise)
+        return AdaptiveBelief(bank, memory=Memory(rival))
+
+    def remember(self, belief: AdaptiveBelief) -> Mapping[str, Any] | None:
+        """Return gain, loss, noise and weights; None until they are known, and during a trial."""
+        if belief.memory.rival is not None or belief.doubt.stands:
+            return None
+        kept = remember(self.bank, belief.bank)
+        return None if kept is None else {"action": self.action, **kept}
+
     def observe(self, belief: AdaptiveBelief, situation: Situation) -> AdaptiveBelief:
         """Return the belief after this sample, whoever steers."""
         h, interval_s = self.period_s, situation.interval_s
         behind_s, since_s = belief.behind_s + interval_s, belief.since_s + interval_s
         given_s = belief.given_s + situation.applied * interval_s
-        bank = belief.bank
+        bank, memory = belief.bank, belief.memory
         power = given_s / since_s if belief.since_s > 0.0 else situation.applied
         reading_c = self._sign * situation.measured_c
         if interval_s > max(UNKNOWN_S, UNKNOWN_PERIODS * h):
-            bank, behind_s, power = self.bank.lost(bank), h, 0.0
+            bank, memory = trial.lost(self.bank, bank, memory)
+            behind_s, power = h, 0.0
         periods = math.floor(behind_s / h + 0.5)
         if periods < 1:
-            return AdaptiveBelief(bank, behind_s, since_s, given_s, belief.doubt)
+            return AdaptiveBelief(bank, behind_s, since_s, given_s, belief.doubt, memory)
         for _ in range(periods - 1):
-            bank = self.bank.observe(bank, math.nan, power)
-        bank = self.bank.observe(bank, reading_c, power)
+            bank, memory = trial.met(self.bank, bank, memory, math.nan, power)
+        bank, memory = trial.met(self.bank, bank, memory, reading_c, power)
         doubt = belief.doubt.after(_doubt(bank.outlook))
-        return AdaptiveBelief(bank, behind_s - periods * h, doubt=doubt)
+        return AdaptiveBelief(bank, behind_s - periods * h, doubt=doubt, memory=memory)
 
     def decide(self, belief: AdaptiveBelief, situation: Situation) -> tuple[AdaptiveBelief, float]:
         """Return the power that lets the water come to rest at the set point."""
@@ -149,6 +177,9 @@ class Adaptive:
         if outlook is None:
             return Beliefs()
         rate, rate_sd = gain(self.bank, bank)
+        rival = belief.memory.rival
+        if rival is not None and rival.block is not None:  # on trial it is no better known than new
+            rate_sd = max(rate_sd, gain(self.bank, rival)[1])
         known = holding_power_sd(bank) <= HOLDING_SD_MAX
         holding_power = outlook.holding_power if known else None
         return Beliefs(self._sign * rate, rate_sd, holding_power=holding_power, lag_s=outlook.lag_s)
@@ -163,8 +194,13 @@ class Adaptive:
         return 0.0 if outlook is None else min(RIDE_LAGS * outlook.lag_s, RIDE_MAX_S)
 
     def remarks(self, belief: AdaptiveBelief) -> Mapping[str, str]:
-        """Return whether power seems to warm nothing: no heater, or one wired to cool."""
-        return {"controller.gain_doubtful": belief.doubt.text} if belief.doubt.stands else {}
+        """Return whether power seems to warm nothing, and the verdict on a remembered model."""
+        remarks, memory = {}, belief.memory
+        if belief.doubt.stands:  # no heater, or one wired to cool
+            remarks["controller.gain_doubtful"] = belief.doubt.text
+        if memory.verdict:
+            remarks[memory.verdict] = memory.text
+        return remarks
 
 
 def _doubt(outlook: Outlook | None) -> str:

@@ -158,18 +158,22 @@ class Weights(NamedTuple):
         log += np.log(S)
         log *= -0.5 * e
         log += self.log  # ALF (6)-(7), in logarithms
-        likeliest = int(log.argmax())
-        log -= log[likeliest]
-        np.maximum(log, FLOOR, out=log)
-        share = np.exp(log)
-        share /= share.sum()
-        return _read_only(Weights(log, share, likeliest))
+        return weighted(log)
+
+
+def weighted(log: Array) -> Weights:
+    """Return the weights of these logarithms, which become theirs: 0 the greatest of them."""
+    likeliest = int(log.argmax())
+    log -= log[likeliest]
+    np.maximum(log, FLOOR, out=log)
+    share = np.exp(log)
+    share /= share.sum()
+    return _read_only(Weights(log, share, likeliest))
 
 
 def equal(hypotheses: Hypotheses) -> Weights:
     """Return the weights before any evidence."""
-    n = len(hypotheses)
-    return _read_only(Weights(np.zeros(n), np.full(n, 1.0 / n), 0))
+    return weighted(np.zeros(len(hypotheses)))
 
 
 def _read_only(weights: Weights) -> Weights:

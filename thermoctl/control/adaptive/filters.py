@@ -45,6 +45,27 @@ LOSS_MIN, LOSS_MAX = 0.5, 0.95
 """The loss keeps this far below the least and within this share of full power, in gains."""
 
 
+class Prior(NamedTuple):
+    """What is believed of gain and loss before the first reading; all in K/s.
+
+    Parameters
+    ----------
+    gain, gain_sd : float
+        Heating rate at full power.
+    loss, loss_sd : float
+        Cooling without power.
+    """
+
+    gain: float = START_GAIN
+    gain_sd: float = START_SD[BETA]
+    loss: float = 0.0
+    loss_sd: float = START_SD[D]
+
+
+UNKNOWN = Prior()
+"""A plant never seen before."""
+
+
 class Drift(NamedTuple):
     """Process noise of a period, as `drift` makes it.
 
@@ -76,14 +97,14 @@ def drift(period_s: float) -> Drift:
     )
 
 
-def start(hypotheses: Hypotheses, y_c: float) -> Block:
+def start(hypotheses: Hypotheses, y_c: float, prior: Prior = UNKNOWN) -> Block:
     """Return the block of a plant at rest at its first reading."""
     h, block = hypotheses.period_s, np.zeros((4, 5, len(hypotheses)))
-    sd = np.array(START_SD) * (1.0, 1.0, h, h)
+    sd = np.array([*START_SD[:D], prior.loss_sd * h, prior.gain_sd * h])
     P = np.diag(sd**2)
     P[T, Z] = P[Z, T] = START_CORRELATION * sd[T] * sd[Z]
     block[:, :X] = P[:, :, None]
-    block[:, X] = np.array([y_c, y_c, 0.0, START_GAIN * h])[:, None]
+    block[:, X] = np.array([y_c, y_c, prior.loss * h, prior.gain * h])[:, None]
     return block
 
 

@@ -1,0 +1,137 @@
+"""What of a bank outlives a restart, and how firmly it is believed then.
+
+Gain, loss, noise and the weights of the hypotheses are worth keeping: they belong to the plant.
+Where the water was, and which power was on its way, are not. As plants change while nobody looks,
+gain and loss come back less certain than they were left, and the weights closer together. What
+comes back is on trial anyway (`thermoctl.control.adaptive.trial`).
+
+Implements section 9 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from thermoctl.control.adaptive.bank import Bank, BankBelief
+from thermoctl.control.adaptive.evidence import FLOOR, Noise, weighted
+from thermoctl.control.adaptive.filters import (
+    DRIFT_GAIN_MIN,
+    GAIN_MAX,
+    LOSS_MAX,
+    LOSS_MIN,
+    Prior,
+)
+from thermoctl.control.adaptive.hypotheses import (
+    LAGS,
+    LONGEST_OVER_SHORTEST,
+    SHAPES,
+    SHORTEST_LAG_S,
+)
+from thermoctl.control.adaptive.plant_belief import plant_belief
+from thermoctl.quantities import Array, is_finite_number
+
+KNOWN_SHARE = 0.25
+"""A gain is known, and worth keeping, once its deviation is at most this share of it."""
+
+GAIN_SHARE = 0.1
+"""A gain comes back with at least this share of it as its deviation."""
+LOSS_SHARE = 0.1
+"""And a loss with this share of the gain: it depends on temperature and surroundings."""
+DOUBLED_S = 14 * 86400.0
+"""After such a time the variance of the gain is twice as large; it grows with time from there."""
+WEIGHT_POWER = 0.5
+"""Weights come back raised to this power, and so half as telling,"""
+WEIGHT_FLOOR = -5.0
+"""and no log weight lower than this: a few samples bring every hypothesis back."""
+
+NOISE_MAX_K2 = 100.0
+_DIGITS = 5
+
+
+def remember(bank: Bank, belief: BankBelief) -> dict[str, Any] | None:
+    """Return what is worth keeping, as plain numbers; None until the gain is known."""
+    plant = plant_belief(bank, belief)
+    if plant is None:
+        return None
+    rate, rate_sd = plant.gain_k_per_s, plant.gain_sd_k_per_s
+    if not (rate > DRIFT_GAIN_MIN and rate_sd <= KNOWN_SHARE * rate):
+        return None
+    return {
+        "period_s": bank.period_s,
+        "hypotheses": _hypotheses(),
+        "gain_k_per_s": _rounded(rate),
+        "gain_sd_k_per_s": _rounded(rate_sd),
+        "loss_k_per_s": _rounded(plant.loss_k_per_s),
+        "loss_sd_k_per_s": _rounded(plant.loss_sd_k_per_s),
+        "noise_variance_k2": _rounded(belief.noise.variance),
+        "log_weights": [_rounded(each) for each in belief.weights.log.tolist()],
+    }
+
+
+def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBelief:
+    """Return the belief before the first sample, with what was remembered for `age_s`.
+
+    Raises
+    ------
+    ValueError
+        It is of another bank, or no plant could be like that; the text says what was expected.
+    """
+    for name, expected in (("period_s", bank.period_s), ("hypotheses", _hypotheses())):
+        if remembered.get(name) != expected:
+            raise ValueError(f"expected {name} {expected!r}, got {remembered.get(name)!r}")
+    rate = _number(remembered, "gain_k_per_s", DRIFT_GAIN_MIN, GAIN_MAX)
+    rate_sd = _number(remembered, "gain_sd_k_per_s", 0.0, KNOWN_SHARE * rate)
+    lost = _number(remembered, "loss_k_per_s", -LOSS_MIN * rate, LOSS_MAX * rate)
+    lost_sd = _number(remembered, "loss_sd_k_per_s", 0.0, GAIN_MAX)
+    variance = _number(remembered, "noise_variance_k2", 0.0, NOISE_MAX_K2)
+    log = _log_weights(remembered, len(bank.hypotheses))
+    aged = math.sqrt(1.0 + max(age_s, 0.0) / DOUBLED_S)
+    prior = Prior(
+        rate,
+        aged * max(rate_sd, GAIN_SHARE * rate),
+        lost,
+        max(lost_sd, LOSS_SHARE * rate),
+    )
+    weights = weighted(np.maximum(WEIGHT_POWER * log, WEIGHT_FLOOR))
+    return replace(bank.start(), noise=Noise(variance), weights=weights, prior=prior)
+
+
+def _hypotheses() -> dict[str, Any]:
+    """Return which hypotheses there are; weights of others would say nothing of these."""
+    return {
+        "shortest_lag_s": SHORTEST_LAG_S,
+        "longest_over_shortest": LONGEST_OVER_SHORTEST,
+        "lags": LAGS,
+        "shapes": [list(shape) for shape in SHAPES],
+    }
+
+
+def _number(remembered: Mapping[str, Any], name: str, low: float, high: float) -> float:
+    """Return the number `name`, which must lie in [low, high]."""
+    value = remembered.get(name)
+    if not is_finite_number(value) or not low <= value <= high:  # type: ignore[operator]
+        raise ValueError(f"expected {name} in [{low:g}, {high:g}], got {value!r}")
+    return float(value)  # type: ignore[arg-type]
+
+
+def _log_weights(remembered: Mapping[str, Any], n: int) -> Array:
+    """Return the log weights, shape (n,): the greatest is 0, none below the floor."""
+    told = remembered.get("log_weights")
+    if not (isinstance(told, list) and len(told) == n and all(map(is_finite_number, told))):
+        raise ValueError(f"expected log_weights, {n} finite numbers, got {told!r}")
+    log = np.array(told, dtype=float)
+    if not (log.max() == 0.0 and log.min() >= FLOOR):
+        raise ValueError(
+            f"expected log_weights from {FLOOR:g} to 0, the greatest being 0, got"
+            f" {log.min():g} to {log.max():g}"
+        )
+    return log
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")

@@ -1,0 +1,110 @@
+r"""Whether a remembered bank foresees better than one that knows nothing.
+
+Both see the same samples, and the remembered one steers. Every reading is a prediction put to the
+test: the log odds between the two grow by the difference of
+
+.. math:: \ell = \ln \sum_j w_j \, S_j^{-1/2} e^{-\min(\nu_j^2/S_j,\,25)/2}
+
+as often as the sample counts as evidence, ALF (6)-(7) with two models in place of many. So the
+odds are those of Bayes: a model that is right gains on one that expects anything, and one that is
+wrong loses to it. The loser is dropped, and from then on there is one bank again.
+
+Implements section 9 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from thermoctl.control.adaptive.bank import Bank, BankBelief
+from thermoctl.control.adaptive.evidence import EVIDENCE_FROM, GATE
+from thermoctl.control.adaptive.filters import T, X, Z
+
+DROP_ODDS = -3.0
+"""Log odds at which the remembered bank goes: 20 to 1 against it."""
+HEARD_S, HEARD_LAGS = 60.0, 3.0
+"""The trial is over after so much of exciting time, and so many lags of it."""
+
+TRUSTED, DROPPED = "model.trusted", "model.dropped"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Memory:
+    """What has become of a remembered bank.
+
+    Parameters
+    ----------
+    rival : BankBelief or None
+        The bank that began with nothing; None when there is no trial, or it is over.
+    odds : float
+        Natural logarithm of the odds for the remembered one.
+    heard_s : float
+        Time that counted as evidence.
+    verdict, text : str
+        `TRUSTED` or `DROPPED`, and why; empty until then, or when nothing was remembered.
+    """
+
+    rival: BankBelief | None = None
+    odds: float = 0.0
+    heard_s: float = 0.0
+    verdict: str = ""
+    text: str = ""
+
+
+def met(
+    law: Bank, bank: BankBelief, memory: Memory, y_c: float, applied: float
+) -> tuple[BankBelief, Memory]:
+    """Return bank and trial after a period of `applied` and the reading `y_c`."""
+    after, rival = law.observe(bank, y_c, applied), memory.rival
+    if rival is None:
+        return after, memory
+    heard = 0.0
+    if math.isfinite(y_c) and after.sample >= EVIDENCE_FROM:
+        heard = after.excitation.share
+    odds = memory.odds
+    if heard > 0.0:
+        odds += heard * (foretold(law, bank, y_c) - foretold(law, rival, y_c))
+    rival = law.observe(rival, y_c, applied)
+    heard_s = memory.heard_s + heard * law.period_s
+    return _judged(after, Memory(rival, odds, heard_s))
+
+
+def lost(law: Bank, bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:
+    """Return bank and trial after a gap of which the applied power is not known."""
+    rival = memory.rival
+    after = memory if rival is None else replace(memory, rival=law.lost(rival))
+    return law.lost(bank), after
+
+
+def _judged(bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:
+    """Return the bank to go on with, and the trial, over or not."""
+    rival, odds, heard_s = memory.rival, memory.odds, memory.heard_s
+    if rival is None or bank.outlook is None:
+        return bank, memory
+    words = f"log odds {odds:.1f} for the stored model after {heard_s:.0f} s of changing power"
+    enough_s = max(HEARD_S, HEARD_LAGS * bank.outlook.lag_s)
+    if odds < DROP_ODDS or (odds < 0.0 and heard_s >= enough_s):
+        return rival, Memory(None, odds, heard_s, DROPPED, words)
+    if heard_s >= enough_s:
+        return bank, Memory(None, odds, heard_s, TRUSTED, words)
+    return bank, memory
+
+
+def foretold(law: Bank, belief: BankBelief, y_c: float) -> float:
+    """Return the log likelihood of the reading `y_c`, before the bank has seen it.
+
+    The sensor follows the water it lay in, so what is expected does not depend on the power of the
+    period that has just passed.
+    """
+    if belief.block is None:
+        return 0.0
+    block, a = belief.block, law.hypotheses.sensor_step
+    nu = y_c - (block[Z, X] + a * (block[T, X] - block[Z, X]))
+    S = (1.0 - a) ** 2 * block[Z, Z] + 2.0 * a * (1.0 - a) * block[T, Z] + a * a * block[T, T]
+    S = S + law.drift.z + belief.noise.believed
+    log = belief.weights.log - 0.5 * (np.log(S) + np.minimum(nu * nu / S, GATE))
+    most = float(log.max())
+    return most + math.log(float(np.exp(log - most).sum() * belief.weights.share.max()))
