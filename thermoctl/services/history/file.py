@@ -24,6 +24,7 @@ from thermoctl.services.history.schema import (
     SCHEMA_VERSION,
     RunInfo,
     Value,
+    migration,
 )
 
 BUSY_S: Final = 1.0
@@ -67,8 +68,10 @@ def open_history(
 ) -> Opened:
     """Return the history at `path`, new where there is none.
 
-    A file that is damaged, not a database, another program's or of a newer schema is renamed, and
-    a new one is begun: losing sight of the past is better than losing the future too.
+    One of an older schema gets the columns it lacks, and keeps its rows; SQLite only notes that
+    there are more columns, so that gigabytes take no longer. A file that is damaged, not a
+    database, another program's or of a newer schema is renamed, and a new one is begun: losing
+    sight of the past is better than losing the future too.
 
     Parameters
     ----------
@@ -214,12 +217,24 @@ def _unusable(connection: sqlite3.Connection, check: bool) -> str:
         connection.execute("PRAGMA synchronous = NORMAL")  # WAL stays whole; fsync at checkpoints
         if not tables:
             connection.executescript(f"BEGIN IMMEDIATE; {SCHEMA} COMMIT;")
+        elif version < SCHEMA_VERSION:
+            _migrate(connection)
     except sqlite3.Error as error:
         if _is_damage(error):
             return str(error)
         connection.close()
         raise
     return ""
+
+
+def _migrate(connection: sqlite3.Connection) -> None:
+    """Make an older file one of today, as a whole or not at all."""
+    connection.execute("BEGIN IMMEDIATE")
+    # Asked again behind the lock: another process may have come first.
+    version = connection.execute("PRAGMA user_version").fetchone()[0]
+    for statement in migration(version):
+        connection.execute(statement)
+    connection.execute("COMMIT")
 
 
 def _seen_anew(path: Path) -> str:

@@ -29,6 +29,7 @@ from thermoctl.services.history.schema import (
     SCHEMA_VERSION,
     Kind,
     RunInfo,
+    readable_from,
 )
 
 ROWS_AT_ONCE: Final = 4096
@@ -207,7 +208,9 @@ def _rows(
     values = {"loop": which.loop, "since": which.since_s, "until": which.until_s}
     first, last = connection.execute(_SPAN, values).fetchone()
     values |= {"first": first, "last": last}
-    cursor = connection.execute(_SELECT.format(", ".join(names)), values)
+    version = connection.execute("PRAGMA user_version").fetchone()[0]
+    selected = ", ".join(readable_from(name, version) for name in names)
+    cursor = connection.execute(_SELECT.format(selected), values)
     rows = cursor.fetchmany(ROWS_AT_ONCE)
     if not rows:
         raise Unavailable(f"{path} should hold {which.words}, but {_contents(connection)}")

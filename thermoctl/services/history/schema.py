@@ -1,7 +1,7 @@
 """The tables of the history, and what one cycle looks like in them.
 
 A column is described once, in `COLUMNS`: the table, the row of a cycle, the arrays of the reader
-and the header of the CSV all follow from it.
+and the header of the CSV all follow from it, and so does what an older file lacks.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any, Final, Literal
 from thermoctl.services.plain import as_json
 from thermoctl.signals import Cycle, Event
 
-SCHEMA_VERSION: Final = 1
+SCHEMA_VERSION: Final = 2
 """Kept in ``PRAGMA user_version``; a higher one was written by a newer thermoctl."""
 
 APPLICATION_ID: Final = 0x7468726D
@@ -57,11 +57,15 @@ class RunInfo:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column of ``cycles``: name with unit, type, and where it is from."""
+    """One column of ``cycles``: name with unit, type, and where it is from.
+
+    `since` is the first schema that has it; rows of an older one have nothing in it.
+    """
 
     name: str
     kind: Kind
     of: Callable[[Cycle], Value]
+    since: int = 1
 
 
 def _active(cycle: Cycle) -> str | None:
@@ -95,6 +99,9 @@ COLUMNS: Final = (
     Column("a", "REAL", lambda c: c.step.beliefs.a),
     Column("a_sd", "REAL", lambda c: c.step.beliefs.a_sd),
     Column("holding_power", "REAL", lambda c: c.step.beliefs.holding_power),
+    Column("lag_s", "REAL", lambda c: c.step.beliefs.lag_s, since=2),
+    Column("shadow", "TEXT", lambda c: c.step.shadow, since=2),
+    Column("shadow_power", "REAL", lambda c: c.step.shadow_power, since=2),
     Column("tick_us", "REAL", lambda c: c.tick_us),
     Column("late_s", "REAL", lambda c: c.late_s),
     Column("missed", "INTEGER", lambda c: c.missed),
@@ -152,6 +159,19 @@ INSERT_EVENT: Final = (
 INSERT_CLOCK_STEP: Final = (
     "INSERT INTO clock_steps (run, wall_utc_s, t_s, step_s) VALUES (?, ?, ?, ?)"
 )
+
+
+def migration(version: int) -> list[str]:
+    """Return the statements that make a file of schema `version` one of `SCHEMA_VERSION`."""
+    missing = [column for column in COLUMNS if column.since > version]
+    added = [f"ALTER TABLE cycles ADD COLUMN {each.name} {each.kind}" for each in missing]
+    return [*added, f"PRAGMA user_version = {SCHEMA_VERSION}"]
+
+
+def readable_from(name: str, version: int) -> str:
+    """Return what to select for the column `name` in a file of schema `version`."""
+    lacking = any(column.name == name and column.since > version for column in COLUMNS)
+    return f"NULL AS {name}" if lacking else name
 
 
 def row_of(cycle: Cycle) -> tuple[Value, ...]:
