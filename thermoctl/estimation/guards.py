@@ -35,7 +35,7 @@ _WITH_R2 = (CorrectedKalman, RandomWalkKalman)
 class _Memory(NamedTuple):
     """What the guards remember: spread of the regressor, parallel least squares, residuals."""
 
-    phi_mean: Array
+    phi_mean: tuple[float, ...]
     spread_squared: float
     parallel: Estimate
     residuals: Array
@@ -165,23 +165,19 @@ class Guarded:
 
     def _remembered(self, before: GuardedEstimate, phi: Array, y: float) -> _Memory:
         """Return the memory after a usable sample."""
-        memory = before._memory
+        memory, values = before._memory, np.asarray(phi, dtype=np.float64).tolist()
         if memory is None:
             scale = getattr(self.law, "R2", 1.0)  # least squares counts in units of the noise
             parallel = Estimate(before.theta, frozen(before.P / scale))
-            memory = _Memory(np.array(phi, dtype=np.float64), 0.0, parallel, np.empty(0))
-        share = 1.0 / EXCITATION_MEMORY
-        step = phi - memory.phi_mean
-        spread_squared = (1.0 - share) * (memory.spread_squared + share * float(step.dot(step)))
+            memory = _Memory(tuple(values), 0.0, parallel, np.empty(0))
+        phi_mean, spread_squared = _moved(memory, values)
         parallel, residuals = memory.parallel, memory.residuals
         if self.robust_R2:
             parallel = PARALLEL.update(parallel, phi, y)
             residuals = residuals[: RESIDUALS - 1]
             if not parallel.rejected:
                 residuals = _before(abs(parallel.innovation), residuals)
-        step *= share
-        step += memory.phi_mean
-        return _Memory(frozen(step), spread_squared, parallel, residuals)
+        return _Memory(phi_mean, spread_squared, parallel, residuals)
 
 
 def _adopted(belief: Estimate) -> GuardedEstimate:
@@ -196,6 +192,17 @@ def _adopted(belief: Estimate) -> GuardedEstimate:
         belief.inflation,
         belief.rejected,
     )
+
+
+def _moved(memory: _Memory, phi: list[float]) -> tuple[tuple[float, ...], float]:
+    """Return mean and spread after `phi`; a few plain numbers, quicker than in arrays."""
+    share = 1.0 / EXCITATION_MEMORY
+    mean, squared = [], 0.0
+    for value, before in zip(phi, memory.phi_mean, strict=True):
+        step = value - before
+        mean.append(before + share * step)
+        squared += step * step
+    return tuple(mean), (1.0 - share) * (memory.spread_squared + share * squared)
 
 
 def _before(newest: float, rest: Array) -> Array:

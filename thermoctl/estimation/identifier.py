@@ -134,5 +134,6 @@ def pushed(past: Array, newest: float) -> Array:
         return past
     pushed = np.empty_like(past)
     pushed[0] = newest
-    pushed[1:] = past[:-1]
+    if len(past) > 1:
+        pushed[1:] = past[:-1]
     return frozen(pushed)

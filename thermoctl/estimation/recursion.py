@@ -106,6 +106,8 @@ class RecursiveLaw(ABC):
             raise TypeError(f"belief must be an Estimate, got {type(belief).__name__}")
         if phi.shape != belief.theta.shape:
             raise ValueError(f"phi must have shape {belief.theta.shape}, got {phi.shape}")
+        if phi.shape == (1,):
+            return self._update_one(belief, phi.item(), scalar("y", y))
         # Plain floats add up without a warning; the comparison is false for NaN. Once phi, and
         # below e, are known to be sane, nothing here can overflow.
         if not sum(map(abs, phi.tolist())) < LARGEST:
@@ -133,6 +135,29 @@ class RecursiveLaw(ABC):
         flat = rows.ravel()
         if not flat.dot(flat) < LARGEST * LARGEST:
             return rejected(belief)
+        return unstacked(rows, e, S, inflation)
+
+    def _update_one(self, belief: Estimate, phi: float, y: float) -> Estimate:
+        """Return the belief about one parameter: the same in plain floats, in half the time."""
+        if not abs(phi) < LARGEST:
+            return rejected(belief)
+        before = stack(belief)
+        theta, P = before.item(0), before.item(1)
+        e, g = y - theta * phi, P * phi
+        q = max(g * phi, 0.0)
+        S, inflation = self.weigh(q, e, 1, NUMBERS)
+        if not e * e < LARGEST * S < math.inf:
+            return rejected(belief)
+        w = g / math.sqrt(S)
+        theta += e / math.sqrt(S) * w  # O21 (18), (19)
+        P = (P - w * w) * inflation  # O21 (21), and (25) or (13)
+        R1 = self.R1
+        if isinstance(R1, np.ndarray) or R1:
+            P += drift(R1, 1).item()  # O21 (20)
+        if not theta * theta + P * P < LARGEST * LARGEST:
+            return rejected(belief)
+        rows = np.empty((2, 1))
+        rows[0, 0], rows[1, 0] = theta, P
         return unstacked(rows, e, S, inflation)
 
 
