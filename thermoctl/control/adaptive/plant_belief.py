@@ -12,7 +12,6 @@ import numpy as np
 from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.filters import BETA, D, X
 from thermoctl.control.adaptive.hypotheses import LAGS
-from thermoctl.quantities import Array
 from thermoctl.signals import PlantBelief
 
 LAG_QUANTILES = (0.05, 0.95)
@@ -30,16 +29,15 @@ def plant_belief(bank: Bank, belief: BankBelief, sign: float = 1.0) -> PlantBeli
     """
     if belief.block is None or belief.outlook is None:
         return None
-    h, outlook = bank.period_s, belief.outlook
+    outlook = belief.outlook
     _, gain_sd = gain(bank, belief)
-    loss = belief.block[D, X]
-    loss_mean, loss_sd = mixed(loss, belief.block[D, D], belief.weights.share)
+    loss_rate, loss_sd = loss(bank, belief)
     low_s, high_s = lag_quantiles(bank, belief)
     return PlantBelief(
         gain_k_per_s=sign * outlook.gain,
         gain_sd_k_per_s=gain_sd,
-        loss_k_per_s=sign * loss_mean / h,
-        loss_sd_k_per_s=loss_sd / h,
+        loss_k_per_s=sign * loss_rate,
+        loss_sd_k_per_s=loss_sd,
         holding_power=outlook.holding_power,
         holding_power_sd=holding_power_sd(belief),
         lag_s=outlook.lag_s,
@@ -52,32 +50,44 @@ def plant_belief(bank: Bank, belief: BankBelief, sign: float = 1.0) -> PlantBeli
     )
 
 
-def mixed(means: Array, variances: Array, share: Array) -> tuple[float, float]:
-    """Return mean and standard deviation of a mixture with the weights `share`."""
-    mean = float(share.dot(means))
-    spread = means - mean
-    spread *= spread
-    spread += variances
-    return mean, math.sqrt(max(float(share.dot(spread)), 0.0))
+def loss(bank: Bank, belief: BankBelief) -> tuple[float, float]:
+    """Return the loss in K/s with its standard deviation, after the first reading."""
+    return _mixed(bank, belief, D)
 
 
 def gain(bank: Bank, belief: BankBelief) -> tuple[float, float]:
     """Return the gain in K/s with its standard deviation, after the first reading."""
-    assert belief.block is not None
-    mean, sd = mixed(belief.block[BETA, X], belief.block[BETA, BETA], belief.weights.share)
-    return mean / bank.period_s, sd / bank.period_s
+    return _mixed(bank, belief, BETA)
 
 
 def holding_power_sd(belief: BankBelief) -> float:
     """Return the standard deviation of the holding power d/beta, by linearisation."""
     assert belief.block is not None
-    block = belief.block
+    block, share = belief.block, belief.weights.share
     beta = block[BETA, X]
     power = block[D, X] / beta
-    slope = block[D, D] - 2.0 * power * block[D, BETA]
-    slope += power * power * block[BETA, BETA]
-    slope /= beta * beta
-    return mixed(power, slope, belief.weights.share)[1]
+    squares = block[BETA, BETA] * power
+    squares -= 2.0 * block[D, BETA]
+    squares *= power
+    squares += block[D, D]
+    squares /= beta
+    squares /= beta
+    squares += power * power
+    return _spread(float(share.dot(squares)), float(share.dot(power)))
+
+
+def _mixed(bank: Bank, belief: BankBelief, state: int) -> tuple[float, float]:
+    """Return mean and standard deviation of a rate over the hypotheses, in K/s."""
+    assert belief.block is not None
+    share, each = belief.weights.share, belief.block[state, X]
+    mean = float(share.dot(each))
+    squares = float(share.dot(each * each + belief.block[state, state]))
+    return mean / bank.period_s, _spread(squares, mean) / bank.period_s
+
+
+def _spread(squares: float, mean: float) -> float:
+    """Return the standard deviation of a mixture from its mean square and its mean."""
+    return math.sqrt(max(squares - mean * mean, 0.0))
 
 
 def lag_quantiles(bank: Bank, belief: BankBelief) -> tuple[float, float]:
