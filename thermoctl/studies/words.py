@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from thermoctl.insight.wording import number as number
+
 _ASCII = str.maketrans(
     {
         "\N{NO-BREAK SPACE}": " ",
@@ -33,17 +35,6 @@ _ASCII = str.maketrans(
         "²": "2",
     }
 )
-
-
-def number(value: float, sd: float) -> str:
-    """Return `value` ± two standard deviations with the decimals that ± deserves."""
-    if not (math.isfinite(value) and math.isfinite(sd)):
-        return "–"
-    spread = 2.0 * sd
-    if not 1e-9 < spread < 1e6 or abs(value) > 1e9:
-        return f"{value:.4g} ± {spread:.2g}".replace("-", "−")
-    decimals = max(0, 1 - math.floor(math.log10(spread)))
-    return f"{value:.{decimals}f} ± {spread:.{decimals}f}".replace("-", "−")
 
 
 def probability(p: float) -> str:

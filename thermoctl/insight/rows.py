@@ -1,0 +1,113 @@
+"""The plant in physical words, a row each, with error bars.
+
+Explained in ``docs/insight.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from thermoctl.insight import physics
+from thermoctl.insight.values import Row
+from thermoctl.insight.wording import UNKNOWN, number, plain
+from thermoctl.signals import PlantBelief
+
+NO_HEATER = "heater_w is not configured"
+_SIGMAS = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """A quantity and its standard deviation, in the unit of whoever speaks of it."""
+
+    value: float
+    sd: float
+
+    def scaled(self, factor: float) -> Known:
+        """Return both times `factor`."""
+        return Known(self.value * factor, self.sd * abs(factor))
+
+    def over(self, other: Known) -> Known:
+        """Return the quotient of two that have nothing to do with each other."""
+        value = self.value / other.value
+        shares = math.hypot(self.sd / self.value if self.value else 0.0, other.sd / other.value)
+        own = self.sd / abs(other.value)
+        return Known(value, abs(value) * shares if self.value else own)
+
+
+def rows(
+    plant: PlantBelief,
+    gain: Known,
+    slope: Known | None = None,
+    heater_w: float | None = None,
+) -> tuple[Row, ...]:
+    """Return the plant in physical words.
+
+    Parameters
+    ----------
+    plant : PlantBelief
+        What is believed now.
+    gain : Known
+        Heating rate at full power in K/s; of a time at which the power moved.
+    slope : Known, optional
+        How the loss grows with the temperature, in 1/s.
+    heater_w : float, optional
+        Rated power of the heater in W.
+    """
+    holding = Known(plant.holding_power, plant.holding_power_sd)
+    loss = Known(plant.loss_k_per_s, plant.loss_sd_k_per_s)
+    return (
+        _row("gain", "gain", gain.scaled(60.0), "K/min"),
+        _row("loss", "loss", loss.scaled(60.0), "K/min"),
+        _row("holding_power", "holds with", holding.scaled(100.0), "%"),
+        _lag(plant),
+        Row(
+            "noise",
+            "noise",
+            1e3 * plant.noise_sd_k,
+            None,
+            "mK",
+            f"{plain(1e3 * plant.noise_sd_k)} mK",
+        ),
+        *_of_heater(gain, holding, slope, heater_w),
+    )
+
+
+def _lag(plant: PlantBelief) -> Row:
+    low, high = plain(plant.lag_low_s), plain(plant.lag_high_s)
+    text = f"{plain(plant.lag_s)} s, between {low} and {high}"
+    return Row("lag", "lag", plant.lag_s, None, "s", text, plant.lag_low_s, plant.lag_high_s)
+
+
+def _of_heater(
+    gain: Known, holding: Known, slope: Known | None, heater_w: float | None
+) -> tuple[Row, ...]:
+    """Return the rows that need the rated power of the heater."""
+    names = (("volume", "water", "l"), ("loss_w", "loss", "W"), ("loss_w_per_k", "loss", "W/K"))
+    if heater_w is None or not gain.value > 0.0:
+        return tuple(_unknown(*each, NO_HEATER) for each in names)
+    one = Known(physics.litres(heater_w), 0.0)
+    capacity = Known(heater_w, 0.0).over(gain)
+    if slope is None:
+        per_k = _unknown(*names[2], "the temperature has not moved far enough")
+    else:
+        product = capacity.value * slope.value
+        shares = math.hypot(slope.sd / slope.value, capacity.sd / capacity.value)
+        per_k = _row(*names[2][:2], Known(product, product * shares), names[2][2])
+    return (
+        _row("volume", "water", one.over(gain), "l"),
+        _row("loss_w", "loss", holding.scaled(heater_w), "W"),
+        per_k,
+    )
+
+
+def _row(name: str, label: str, known: Known, unit: str) -> Row:
+    if not (math.isfinite(known.value) and math.isfinite(known.sd)):
+        return _unknown(name, label, unit, "not known yet")
+    text = f"{number(known.value, known.sd)} {unit}"
+    return Row(name, label, known.value, _SIGMAS * known.sd, unit, text)
+
+
+def _unknown(name: str, label: str, unit: str, why: str) -> Row:
+    return Row(name, label, None, None, unit, f"{UNKNOWN} {why}")

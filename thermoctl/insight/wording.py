@@ -1,0 +1,23 @@
+"""Quantities in words: digits deserved, true minus, no NaN."""
+
+from __future__ import annotations
+
+import math
+
+UNKNOWN = "–"
+
+
+def number(value: float, sd: float) -> str:
+    """Return `value` ± two standard deviations with the decimals that ± deserves."""
+    if not (math.isfinite(value) and math.isfinite(sd)):
+        return UNKNOWN
+    spread = 2.0 * sd
+    if not 1e-9 < spread < 1e6 or abs(value) > 1e9:
+        return f"{value:.4g} ± {spread:.2g}".replace("-", "−")
+    decimals = max(0, 1 - math.floor(math.log10(spread)))
+    return f"{value:.{decimals}f} ± {spread:.{decimals}f}".replace("-", "−")
+
+
+def plain(value: float, decimals: int = 0) -> str:
+    """Return `value` with so many decimals, and a true minus."""
+    return f"{value:,.{decimals}f}".replace("-", "−") if math.isfinite(value) else UNKNOWN
