@@ -81,14 +81,18 @@ def judge(
     temperature_c = measurement.temperature_c
     if not is_finite_number(temperature_c):
         return replace(memory, verdict=Verdict.MISSING)
-    # Too hot is believed at once, from a stale reading as well: it only ever costs heat.
-    if temperature_c > limits.trip_above_c:
+    over, under = temperature_c > limits.trip_above_c, temperature_c < limits.trip_below_c
+    # Too hot is believed at once, from a stale reading as well: it only ever costs heat. So is too
+    # cold where something cools.
+    if over and limits.can_heat:
         return replace(memory, verdict=Verdict.OVER)
+    if under and limits.can_cool:
+        return replace(memory, verdict=Verdict.UNDER)
     if quality is not Quality.GOOD:
         return replace(memory, verdict=Verdict.MISSING)
     judged = _judge_step(memory, temperature_c, limits, limits.jump_k if jump_k is None else jump_k)
-    if judged.verdict is Verdict.GOOD and temperature_c < limits.trip_below_c:
-        return replace(judged, verdict=Verdict.UNDER)
+    if judged.verdict is Verdict.GOOD and (over or under):
+        return replace(judged, verdict=Verdict.OVER if over else Verdict.UNDER)
     return judged
 
 

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, fields
 
 from thermoctl.errors import Refused
-from thermoctl.quantities import is_finite_number
+from thermoctl.quantities import clamp, is_finite_number
 
-_NO_FINITE_NUMBER = ("rise_per_s", "jump_widens")
+_NO_FINITE_NUMBER = ("rise_per_s", "jump_widens", "power_cools")
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +18,7 @@ class Limits:
     Parameters
     ----------
     trip_above_c, trip_below_c : float
-        Heater off for good beyond these (one reading: power 0; the second: latched).
+        Everything off for good beyond these (one reading: power 0; the second: latched).
     setpoint_min_c, setpoint_max_c : float
         Range of set points that are accepted, inside the trips.
     period_s : float
@@ -26,7 +26,8 @@ class Limits:
     power_max : float
         Most power ever given, a fraction in (0, 1].
     rise_per_s : float
-        Most the power may rise in a second; falling is never slowed. Infinite: no limit.
+        Most the power may move away from 0 in a second; falling is never slowed. Infinite: no
+        limit.
     jump_k : float
         A reading farther than this from the last good one, and far from the usual step between
         readings as well, is an outlier.
@@ -34,6 +35,13 @@ class Limits:
         The hardware may take this much more than it was told before it counts as a fault.
     jump_widens : bool
         Whether a reading may also lie as far off as the gain that is believed in explains.
+    power_min : float
+        Least power ever given, in [-1, 0]: below 0 it is a cooler's; 0: there is none beside the
+        heater.
+    changeover_s : float
+        How long both are off before the other one of the two begins; never less than a period.
+    power_cools : bool
+        Whether the one actuator is a cooler, and power takes heat out.
     """
 
     trip_above_c: float
@@ -46,6 +54,9 @@ class Limits:
     jump_k: float = 1.0
     applied_tolerance: float = 0.1
     jump_widens: bool = True
+    power_min: float = 0.0
+    changeover_s: float = 0.0
+    power_cools: bool = False
 
     HOLD_S = 3.0
     """HOLD keeps the last output no longer than this."""
@@ -80,6 +91,27 @@ class Limits:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)!r}")
         if self.power_max > 1.0:
             raise ValueError(f"power_max is a fraction of full power, got {self.power_max!r}")
+        if not -1.0 <= self.power_min <= 0.0:
+            raise ValueError(f"power_min must lie in [-1, 0], got {self.power_min!r}")
+        if self.changeover_s < 0.0:
+            raise ValueError(f"changeover_s must be at least 0, got {self.changeover_s!r}")
+        if self.power_cools and self.power_min < 0.0:
+            raise ValueError("power_min must be 0 where power_cools: there is one actuator")
+
+    @property
+    def can_heat(self) -> bool:
+        """Whether an actuator brings heat in."""
+        return not self.power_cools
+
+    @property
+    def can_cool(self) -> bool:
+        """Whether an actuator takes heat out."""
+        return self.power_cools or self.power_min < 0.0
+
+    def possible(self, power: object) -> float:
+        """Return `power` limited to what actuators can take, [0, 1] or [-1, 1]; else 0."""
+        low = -1.0 if self.power_min < 0.0 else 0.0
+        return clamp(float(power), low, 1.0) if is_finite_number(power) else 0.0  # type: ignore[arg-type]
 
     @property
     def hold_s(self) -> float:
@@ -128,14 +160,14 @@ class Limits:
             raise Refused(f"expected {allowed}, got {number:g}")
         return number
 
+    def accept_power(self, value: object) -> float:
+        """Return `value` as a power the loop can take; raise `Refused` naming the range."""
+        if not is_finite_number(value) or self.possible(value) != value:
+            low = "-1" if self.power_min < 0.0 else "0"
+            raise Refused(f"expected a power from {low} to 1, got {value!r}")
+        return float(value)
+
 
 def command_lasts_s(period_s: float) -> float:
     """Return how long a command may outlive its sample, for a loop of this period."""
     return 1.5 * period_s + 1.0
-
-
-def accept_power(value: object) -> float:
-    """Return `value` as a power in [0, 1]; raise `Refused` if it is none."""
-    if not is_finite_number(value) or not 0.0 <= float(value) <= 1.0:  # type: ignore[arg-type]
-        raise Refused(f"expected a power from 0 to 1, got {value!r}")
-    return float(value)  # type: ignore[arg-type]

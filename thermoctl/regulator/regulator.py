@@ -59,7 +59,8 @@ class Regulator:
         self._supervisor = Supervisor(plan.limits, self._emit)
         self._guard = Guard(self._supervisor)
         self._steering = Steering(Mind(plan.controller), self._guard, self._emit)
-        self._shadow = Shadow(plan.shadow, plan.limits.power_max, self._emit)
+        limits = plan.limits
+        self._shadow = Shadow(plan.shadow, limits.power_min, limits.power_max, self._emit)
         self._learning = Learning(plan.identifier, self._supervisor, self._guard)
         self._jump_k = plan.limits.jump_k
         self._t_s: float | None = None
@@ -154,7 +155,7 @@ class Regulator:
         taken = float(power) if known else math.nan
         self._supervisor.check_applied(self._command.power, taken, self._t_s or 0.0)
         if known:
-            self._applied = clamp(taken, 0.0, 1.0)
+            self._applied = self._limits.possible(taken)
 
     def fault(self, code: str, fault: int | None, text: str) -> None:
         """Report that something outside failed: SAFE from the next step on.
@@ -175,13 +176,14 @@ class Regulator:
         return self._command.power if self._applied is None else self._applied
 
     def _given(self, applied: float, interval_s: float) -> float:
-        """Return what was given since the last sample, in power times nominal periods.
+        """Return the heat given since the last sample, in power times nominal periods.
 
         Commands expire, so after a long gap nobody knows what was: NaN, and nothing is learnt.
         """
         period_s = self._limits.period_s
         known = interval_s <= max(self._limits.RIDE_S, 10.0 * period_s)
-        return applied * interval_s / period_s if known else math.nan
+        heat = -applied if self._limits.power_cools else applied
+        return heat * interval_s / period_s if known else math.nan
 
     def _time(self, t_s: float) -> tuple[float, float]:
         """Return the time of this step, and since the last; time that stands still goes on anyway.
@@ -218,9 +220,8 @@ class Regulator:
             return 0.0, "off"
         if state is State.HOLD:
             held = self._supervisor.last_power
-            return (
-                min(held, self._wishes.manual_power) if self._wishes.mode is Mode.MANUAL else held
-            ), "hold"
+            manual = self._wishes.mode is Mode.MANUAL
+            return _up_to(self._wishes.manual_power, held) if manual else held, "hold"
         if self._wishes.mode is Mode.MANUAL:
             return self._wishes.manual_power, "manual"
         if state in (State.SAFE, State.LATCHED):
@@ -229,8 +230,8 @@ class Regulator:
             return 0.0, "unknown"
         asked = self._steering.decide(situation)
         if state is State.RIDE and is_finite_number(asked):
-            holding = clamp(beliefs.holding_power or 0.0, 0.0, 1.0)
-            return clamp(float(asked), 0.0, holding), "ride"  # type: ignore[arg-type]
+            holding = self._limits.possible(beliefs.holding_power)
+            return _up_to(holding, float(asked)), "ride"  # type: ignore[arg-type]
         return asked, "control"
 
     def _notice_unknown_power(self, t_s: float) -> None:
@@ -269,3 +270,8 @@ class Regulator:
 
     def _emit(self, name: str, **fields: object) -> None:
         self._events.append((name, fields))
+
+
+def _up_to(most: float, power: float) -> float:
+    """Return `power` limited to what lies between 0 and `most`, of whatever sign."""
+    return clamp(power, min(most, 0.0), max(most, 0.0))

@@ -22,19 +22,26 @@ class Shadow:
     ----------
     controller : Controller or None
         The law; None for a loop without a shadow, which then costs nothing.
-    power_max : float
-        Most power that is ever given.
+    power_min, power_max : float
+        Least and most power that is ever given.
     emit : callable
         Called as ``emit(name, **fields)`` when the law has failed.
     """
 
-    def __init__(self, controller: Controller | None, power_max: float, emit: Emit) -> None:
+    def __init__(
+        self, controller: Controller | None, power_min: float, power_max: float, emit: Emit
+    ) -> None:
         self._mind = None if controller is None else Mind(controller)
-        self._power_max = power_max
+        self._bounds = power_min, power_max
         self._emit = emit
         self._power: float | None = None
         self._surprises_k = (math.nan, math.nan)
         self._tally = Tally()
+
+    @property
+    def mind(self) -> Mind | None:
+        """The controller with what it remembers, None without one."""
+        return self._mind
 
     @property
     def name(self) -> str | None:
@@ -95,7 +102,7 @@ class Shadow:
                 self._drop(asked)
                 return
             if is_finite_number(asked):
-                self._power = clamp(float(asked), 0.0, self._power_max)  # type: ignore[arg-type]
+                self._power = clamp(float(asked), *self._bounds)  # type: ignore[arg-type]
         known = self._power if steered else None
         self._tally = self._tally.after(
             None if known is None else Round(seen_s, given, known, *self._surprises_k)

@@ -1,4 +1,4 @@
-"""Decides what the heater may do, whatever anybody wants or asks for.
+"""Decides what heater and cooler may do, whatever anybody wants or asks for.
 
 The states and what moves them (times are those of `thermoctl.regulator.limits.Limits`):
 
@@ -28,6 +28,7 @@ from collections.abc import Callable
 from thermoctl.errors import Refused
 from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.alarms import AlarmRegister
+from thermoctl.regulator.changeover import Changeover
 from thermoctl.regulator.judge import Judged, Verdict, judge
 from thermoctl.regulator.limits import Limits
 from thermoctl.signals import Alarm, Command, Measurement, State
@@ -69,6 +70,8 @@ class Supervisor:
         self._opened_s: deque[float] = deque(maxlen=limits.OPEN_COUNT)
         self._excess = 0
         self._last_power = 0.0
+        self._taken = 0.0  # the last command, or what the actuators made of it
+        self._changeover = Changeover()
 
     @property
     def verdict(self) -> Verdict:
@@ -217,8 +220,9 @@ class Supervisor:
         """Return the command for the power `asked` for; what is no number becomes 0.
 
         The one place where limits hold. Falling is never slowed; nothing at all passes in SAFE,
-        LATCHED or while a trip waits to be confirmed.
+        LATCHED or while a trip waits to be confirmed: safe is 0, for heater and cooler alike.
         """
+        self._changeover = self._changeover.after(self._taken, self._seen_s)
         if self.state in (State.SAFE, State.LATCHED):
             power, reason = 0.0, self._why_off()
         elif self._tripping is not None:
@@ -227,7 +231,7 @@ class Supervisor:
             power, reason = 0.0, "output.nan"
         else:
             power, reason = self._limited(float(asked), reason)  # type: ignore[arg-type]
-        self._last_power = power
+        self._last_power = self._taken = power
         return Command(power, self.limits.valid_until_s(t_s), reason)
 
     @property
@@ -236,12 +240,16 @@ class Supervisor:
         return self._last_power
 
     def _limited(self, asked: float, reason: str) -> tuple[float, str]:
-        power = clamp(asked, 0.0, self.limits.power_max)
+        limits = self.limits
+        power = clamp(asked, limits.power_min, limits.power_max)
         if power != asked:
             reason = "limit.high" if asked > power else "limit.low"
-        step = self.limits.rise_per_s * self._seen_s
-        if power > self._last_power + step:
-            return self._last_power + step, "limit.rate"
+        if self._changeover.waits(power, limits.changeover_s):
+            return 0.0, "limit.changeover"
+        most = max(math.copysign(self._last_power, self._last_power * power), 0.0)
+        most += limits.rise_per_s * self._seen_s
+        if abs(power) > most:
+            return math.copysign(most, power), "limit.rate"
         return power, reason
 
     def _why_off(self) -> str:
@@ -249,8 +257,17 @@ class Supervisor:
         return next((row.code for row in rows if row.latched or row.active), self.state.value)
 
     def check_applied(self, commanded: float, applied: float, t_s: float) -> None:
-        """Compare what was taken with the command: more, twice in a row, is a fault."""
-        excess = not applied <= commanded + self.limits.applied_tolerance
+        """Compare what was taken with the command: more, twice in a row, is a fault.
+
+        More of either: a cooler that is on while the heater was asked for is no less a fault.
+        """
+        limits = self.limits
+        tolerance = limits.applied_tolerance
+        excess = not applied <= max(commanded, 0.0) + tolerance
+        if limits.power_min < 0.0:
+            excess = excess or applied < min(commanded, 0.0) - tolerance
+        if math.isfinite(applied):
+            self._taken = limits.possible(applied)
         self._excess = self._excess + 1 if excess else 0
         if self._excess >= _FAILED_IN_A_ROW:
             text = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from thermoctl.errors import Refused
-from thermoctl.regulator.limits import Limits, accept_power
+from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Emit
 from thermoctl.signals import Mode
 
@@ -49,5 +49,5 @@ class Wishes:
         self.setpoint_c = accepted_c
 
     def want_power(self, power: float) -> None:
-        """Give `power`, a fraction in [0, 1], in mode manual."""
-        self.manual_power = accept_power(power)
+        """Give `power`, a fraction of what the loop can take, in mode manual."""
+        self.manual_power = self._limits.accept_power(power)
