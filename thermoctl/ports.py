@@ -217,6 +217,48 @@ class Foretelling(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class Remembered:
+    """What a controller of an earlier run has learnt.
+
+    Parameters
+    ----------
+    model : mapping
+        As its `remember` returned it, and as it came back from a file: anything may stand there.
+    age_s : float
+        How long ago.
+    """
+
+    model: Mapping[str, Any]
+    age_s: float
+
+
+@runtime_checkable
+class Remembering(Protocol):
+    """A controller that goes on with what it learnt before a restart; no law has to."""
+
+    def remember(self, belief: Any) -> Mapping[str, Any] | None:
+        """Return what is worth keeping, as JSON knows it; None while nothing is."""
+        ...
+
+    def origin(self, belief: Any) -> str | None:
+        """Return what the model began with: ``new``, ``trial``, ``stored`` or ``dropped``."""
+        ...
+
+    def start_from(self, remembered: Mapping[str, Any], age_s: float) -> Any:
+        """Return the belief before the first sample, with what was `remembered` for `age_s`.
+
+        What comes back may be of another plant by now: it has to be doubted, and given up where the
+        readings speak against it.
+
+        Raises
+        ------
+        ValueError
+            It is implausible, or of another law; the text says what was expected and what came.
+        """
+        ...
+
+
 @runtime_checkable
 class Knowing(Protocol):
     """A controller that can also say what its plant is like; no law has to."""

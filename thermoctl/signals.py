@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 from thermoctl.quantities import Array
 
@@ -278,12 +279,21 @@ def _nothing() -> None:
     """Return what is known of a plant of which nothing is."""
 
 
+def _no_models() -> Mapping[str, Mapping[str, Any]]:
+    """Return what is worth keeping of laws that remember nothing."""
+    return {}
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
     """Everything the regulator made of one measurement.
 
     `shadow` is the name of the controller that is asked beside `controller`, `shadow_power` what it
-    would have given, within the limit of power; None where there is none, or no answer.
+    would have given, within the limit of power; None where there is none, or no answer. `origin`
+    says what the model of the one in charge began with: ``new`` with nothing, ``trial`` or
+    ``stored`` with what an earlier run had learnt, ``dropped`` with that in vain. `remember`
+    returns what each of the two would like to be kept, by the name of its law; like `plant`, it is
+    reckoned when asked for.
     """
 
     t_s: float
@@ -301,6 +311,8 @@ class Step:
     shadow_power: float | None = None
     shadow_score: ShadowScore | None = None
     tell: Callable[[], PlantBelief | None] = field(default=_nothing, repr=False)
+    origin: str | None = None
+    remember: Callable[[], Mapping[str, Mapping[str, Any]]] = field(default=_no_models, repr=False)
 
     @property
     def plant(self) -> PlantBelief | None:

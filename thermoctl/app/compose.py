@@ -9,6 +9,7 @@ import errno
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import serial
@@ -20,8 +21,9 @@ from thermoctl.app.plugins import BadOption
 from thermoctl.app.settings import Settings
 from thermoctl.app.tables import LoopTable
 from thermoctl.errors import ConfigError, LinkError
-from thermoctl.ports import Board, Clock
+from thermoctl.ports import Board, Clock, Remembered
 from thermoctl.regulator import Regulator
+from thermoctl.regulator.recollection import NOTHING
 from thermoctl.runtime.connection import Connection
 from thermoctl.runtime.loop import Loop, Publish, Wiring
 from thermoctl.signals import Alarm, Mode
@@ -33,7 +35,10 @@ _WRITE_TIMEOUT_S = 0.5
 
 
 def regulator_for(
-    settings: Settings, loop: str | None = None, latched: Alarm | None = None
+    settings: Settings,
+    loop: str | None = None,
+    latched: Alarm | None = None,
+    remembered: Mapping[str, Remembered] = NOTHING,
 ) -> Regulator:
     """Return the regulator of a loop: pure, without I/O and without a clock.
 
@@ -45,6 +50,8 @@ def regulator_for(
         Name of the loop; the first one when not given.
     latched : Alarm, optional
         A latch of an earlier run.
+    remembered : mapping, optional
+        What controllers of an earlier run have learnt, by their names.
 
     Raises
     ------
@@ -53,7 +60,7 @@ def regulator_for(
     """
     name, table = settings.loop(loop)
     try:
-        return Regulator(plan_for(table), latched)
+        return Regulator(plan_for(table), latched, remembered)
     except BadOption as error:
         raise ConfigError(f"loop {name!r}: {error}") from error
 
@@ -109,7 +116,8 @@ def loop_for(
     publish: Publish,
     *,
     beside: bool = True,
-    latched: dict[str, Alarm] | None = None,
+    latched: Mapping[str, Alarm] = MappingProxyType({}),
+    remembered: Mapping[str, Mapping[str, Remembered]] = MappingProxyType({}),
     completed: Callable[[], None] = lambda: None,
 ) -> Loop:
     """Return the loop over every loop of `settings`, with its boards not yet opened.
@@ -132,10 +140,11 @@ def loop_for(
     boards = {}
     for name, board in settings.boards.items():
         boards[name] = Connection(name, board_builder(board, clock), clock, report, beside=beside)
-    wirings = [
-        _wiring(name, table, boards, regulator_for(settings, name, (latched or {}).get(name)))
-        for name, table in settings.loops.items()
-    ]
+    wirings = []
+    for name, table in settings.loops.items():
+        models = remembered.get(name, NOTHING)
+        regulator = regulator_for(settings, name, latched.get(name), models)
+        wirings.append(_wiring(name, table, boards, regulator))
     loop = Loop(wirings, clock, period_s, publish, completed)
     reports.append(loop.report)
     return loop

@@ -54,6 +54,7 @@ def cycle_record(cycle: Cycle) -> dict[str, Any]:
         "a_sd": finite(beliefs.a_sd),
         "holding_power": finite(beliefs.holding_power),
         "lag_s": finite(beliefs.lag_s),
+        "model_origin": step.origin,
         "shadow": step.shadow,
         "shadow_power": step.shadow_power,
         "shadow_score": None if step.shadow_score is None else asdict(step.shadow_score),

@@ -8,9 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from thermoctl.control.autotune import AutoTune, Experiment, Found, GivenUp, Tuning
+from thermoctl.control.pid_remembered import as_remembered, found_before
+from thermoctl.control.mirror import mirrored
 from thermoctl.control.pid_terms import PidTerms, Terms
 from thermoctl.control.relay import RelayTest
 from thermoctl.control.simc import Gains
@@ -30,10 +32,13 @@ class PidBelief:
         Of the law.
     tuning : Tuning
         How its gains came about, or will.
+    kept : Gains or None
+        What an earlier run has found; in force until a test of this one has found something.
     """
 
     terms: Terms = field(default_factory=Terms)
     tuning: Tuning = field(default_factory=Tuning)
+    kept: Gains | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +68,8 @@ class Pid:
         b, from 0 to 1: the share of a step of the set point that meets the power at once.
     tuning : str
         ``fixed``: the gains as given. ``simc``: from the first warm-up of 3 K or more in mode auto.
-        ``relay``: from a swing about the set point. What is found is told by an event, and kept by
-        whoever writes it here, with ``fixed``.
+        ``relay``: from a swing about the set point. What is found is told by an event, and kept
+        over restarts; for good by whoever writes it here, with ``fixed``.
     tuned_form : str
         What is tuned: ``pi``, or ``pid``, which settles sooner, is no steadier at rest, and moves
         the power ten times as far.
@@ -75,6 +80,9 @@ class Pid:
         be well above the one that holds the set point, and begins at twice this.
     period_s : float
         Time between two samples, as the loop has it.
+    action : {'heat', 'cool', 'heat-cool'}
+        What power does to the plant; heat-cool: a positive one heats and a negative one cools, by
+        the same gains, and tests are made with the heater.
 
     Raises
     ------
@@ -92,6 +100,7 @@ class Pid:
     tuning_limit_s: float = 14400.0
     relay_amplitude: float = 0.25
     period_s: float = 1.0
+    action: Literal["heat", "cool", "heat-cool"] = "heat"
     autotune: AutoTune | None = field(init=False, repr=False, compare=False)
 
     name: ClassVar[str] = "pid"
@@ -114,6 +123,8 @@ class Pid:
                 raise ValueError(f"{name} must lie in [{low:g}, {high:g}], got {value!r}")
         if self.tuning not in ("fixed", "simc", "relay"):
             raise ValueError(f"tuning must be 'fixed', 'simc' or 'relay', got {self.tuning!r}")
+        if self.action not in ("heat", "cool", "heat-cool"):
+            raise ValueError(f"action must be 'heat', 'cool' or 'heat-cool', got {self.action!r}")
         if self.tuned_form not in ("pi", "pid"):
             raise ValueError(f"tuned_form must be 'pi' or 'pid', got {self.tuned_form!r}")
         object.__setattr__(self, "autotune", self._autotune())
@@ -132,8 +143,36 @@ class Pid:
         """Return the belief before the first sample."""
         return PidBelief()
 
+    def start_from(self, remembered: Mapping[str, Any], age_s: float) -> PidBelief:
+        """Return the belief before the first sample, with the gains that an earlier run has found.
+
+        With `tuning` simc they hold until a warm-up tells anew, so that a plant that has changed
+        meanwhile is found out at the first one. With relay there is no swing any more.
+
+        Raises
+        ------
+        ValueError
+            They were found in another way or at another period, or no test finds such.
+        """
+        found = found_before(remembered, self.tuning, self.tuned_form, self.period_s)
+        if self.tuning == "relay":
+            return PidBelief(tuning=Tuning(outcome=found), kept=found.gains)
+        return PidBelief(kept=found.gains)
+
+    def remember(self, belief: PidBelief) -> Mapping[str, Any] | None:
+        """Return the gains that were found; None before, and where they are given."""
+        outcome = belief.tuning.outcome
+        if not isinstance(outcome, Found):
+            return None
+        return as_remembered(outcome, self.tuning, self.tuned_form, self.period_s)
+
+    def origin(self, belief: PidBelief) -> str:
+        """Return whether gains of an earlier run are in force."""
+        return "stored" if belief.kept is not None and belief.kept == self.gains(belief) else "new"
+
     def observe(self, belief: PidBelief, situation: Situation) -> PidBelief:
         """Return the belief after this sample, whoever steered up to it."""
+        situation = self._seen(situation)
         tuning, law = belief.tuning, self._law(belief)
         if self.autotune is not None:
             tuning = self.autotune.observe(tuning, situation)
@@ -145,10 +184,11 @@ class Pid:
             terms = law.integrate(terms, setpoint_c, applied, interval_s)
         elif known:
             terms = law.track(terms, setpoint_c, applied)
-        return PidBelief(replace(terms, asked=math.nan), tuning)
+        return PidBelief(replace(terms, asked=math.nan), tuning, belief.kept)
 
     def decide(self, belief: PidBelief, situation: Situation) -> tuple[PidBelief, float]:
         """Return the power of the law or of its test, not bounded; NaN when not known."""
+        situation = self._seen(situation)
         temperature_c, setpoint_c = situation.temperature_c, situation.setpoint_c
         terms, tuning = belief.terms, belief.tuning
         if not (math.isfinite(temperature_c) and math.isfinite(setpoint_c)):
@@ -156,19 +196,21 @@ class Pid:
         if self.autotune is not None:
             tuning, power = self.autotune.decide(tuning, situation)
             if power is not None:
-                return PidBelief(terms, tuning), power
-        law = self._law(PidBelief(terms, tuning))
+                return PidBelief(terms, tuning, belief.kept), power
+        law = self._law(PidBelief(terms, tuning, belief.kept))
         if math.isnan(terms.integral) or tuning.outcome is not belief.tuning.outcome:
             holding = tuning.outcome.holding_power if isinstance(tuning.outcome, Found) else 0.0
             terms = law.at_rest(terms, setpoint_c, holding)
         power = law.power(terms, setpoint_c)
-        return PidBelief(replace(terms, asked=power), tuning), power
+        return PidBelief(replace(terms, asked=power), tuning, belief.kept), power
 
     def gains(self, belief: PidBelief) -> Gains:
         """Return the gains in force."""
         outcome = belief.tuning.outcome
         if isinstance(outcome, Found):
             return outcome.gains
+        if belief.kept is not None:
+            return belief.kept
         return Gains(self.gain_per_k, self.integral_s, self.derivative_s)
 
     def _law(self, belief: PidBelief) -> PidTerms:
@@ -177,7 +219,13 @@ class Pid:
     def beliefs(self, belief: PidBelief, situation: Situation) -> Beliefs:
         """Return the gain of the plant, once it was found."""
         outcome = belief.tuning.outcome
-        return Beliefs(outcome.slope_k_per_s) if isinstance(outcome, Found) else Beliefs()
+        if not isinstance(outcome, Found):
+            return Beliefs()
+        return Beliefs(-outcome.slope_k_per_s if self.action == "cool" else outcome.slope_k_per_s)
+
+    def _seen(self, situation: Situation) -> Situation:
+        """Return `situation` as a law that heats meets it."""
+        return mirrored(situation) if self.action == "cool" else situation
 
     def ride_s(self, belief: PidBelief) -> float:
         """Return 0: it has no model to steer by without a sensor."""
@@ -189,7 +237,8 @@ class Pid:
         if isinstance(tuning.outcome, Found):
             return {"controller.tuned": f"{_in_words(self.gains(belief))}: {tuning.outcome.text}"}
         if isinstance(tuning.outcome, GivenUp):
-            text = f"{tuning.outcome.text}; {_in_words(self.gains(belief))} as given"
+            whose = "as given" if belief.kept is None else "of an earlier run"
+            text = f"{tuning.outcome.text}; {_in_words(self.gains(belief))} {whose}"
             return {"controller.tuning_failed": text}
         if tuning.run is not None:
             return {"controller.tuning": f"{self.tuning}, at most {self.tuning_limit_s:g} s"}

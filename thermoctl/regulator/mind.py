@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from thermoctl.ports import Controller, Foretelling, Situation
+from thermoctl.ports import Controller, Foretelling, Remembered, Remembering, Situation
 
 
 class Mind:
@@ -23,6 +23,13 @@ class Mind:
         self.controller = controller
         self.belief: Any = controller.start()
         self._foretells = controller if isinstance(controller, Foretelling) else None
+
+    def recall(self, remembered: Remembered) -> bool:
+        """Begin with what an earlier run has learnt; return whether the law can."""
+        if not isinstance(self.controller, Remembering):
+            return False
+        self.belief = self.controller.start_from(remembered.model, remembered.age_s)
+        return True
 
     @property
     def name(self) -> str:

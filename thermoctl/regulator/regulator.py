@@ -7,15 +7,17 @@ clock, no hardware and no file. The walk of a sample through it is `Regulator.st
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from thermoctl.errors import Refused
-from thermoctl.ports import Situation
+from thermoctl.ports import Remembered, Situation
 from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.guard import Guard
 from thermoctl.regulator.judge import Verdict
 from thermoctl.regulator.learning import Learning
 from thermoctl.regulator.mind import Mind
 from thermoctl.regulator.plan import Plan
+from thermoctl.regulator.recollection import NOTHING, origin, recall, remembering
 from thermoctl.regulator.shadow import Shadow
 from thermoctl.regulator.steering import Steering
 from thermoctl.regulator.supervisor import Supervisor
@@ -49,9 +51,16 @@ class Regulator:
         Its parts.
     latched : Alarm, optional
         A latch of an earlier run; the heater stays off until it is acknowledged.
+    remembered : mapping, optional
+        What controllers of an earlier run have learnt, by their names.
     """
 
-    def __init__(self, plan: Plan, latched: Alarm | None = None) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        latched: Alarm | None = None,
+        remembered: Mapping[str, Remembered] = NOTHING,
+    ) -> None:
         self.plan = plan
         self._limits = plan.limits
         self._events: list[tuple[str, dict[str, object]]] = []
@@ -67,6 +76,7 @@ class Regulator:
         self._command = Command(0.0, -math.inf, "start")
         self._applied: float | None = None
         self._unknown_powers = 0
+        recall((self._steering.mind, self._shadow.mind), remembered, self._emit)
         if latched is not None:
             text = _EARLIER_TEXT.format(latched.text)
             self._supervisor.latch(latched.code, latched.fault, text, 0.0)
@@ -266,6 +276,8 @@ class Regulator:
             shadow_power=self._shadow.power,
             shadow_score=self._shadow.score,
             tell=self._steering.tell,
+            origin=origin(self._steering.mind),
+            remember=remembering((self._steering.mind, self._shadow.mind)),
         )
 
     def _emit(self, name: str, **fields: object) -> None:

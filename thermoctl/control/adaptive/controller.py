@@ -28,6 +28,7 @@ from thermoctl.quantities import is_finite_number
 from thermoctl.signals import Beliefs, PlantBelief
 
 CALMNESS_MIN, CALMNESS_MAX = 0.1, 10.0
+RATIO_MIN, RATIO_MAX = 0.02, 10.0
 RIDE_LAGS = 3.0
 UNKNOWN_S, UNKNOWN_PERIODS = 60.0, 10.0
 """After a longer gap nobody knows what was applied: commands expire."""
@@ -77,8 +78,11 @@ class Adaptive:
     period_s : float
         Time between two samples, as the loop has it. Longer and shorter intervals are met by as
         many predictions as periods went by.
-    action : {'heat', 'cool'}
-        What power does to the plant.
+    action : {'heat', 'cool', 'heat-cool'}
+        What power does to the plant; heat-cool: a positive one heats and a negative one cools.
+    cooling_ratio : float
+        For heat-cool: what the cooler takes out at full power over what the heater brings in, from
+        .02 to 10. Where it is not known, rather too low than too high.
 
     Raises
     ------
@@ -88,7 +92,8 @@ class Adaptive:
 
     calmness: float = 0.7
     period_s: float = 1.0
-    action: Literal["heat", "cool"] = "heat"
+    action: Literal["heat", "cool", "heat-cool"] = "heat"
+    cooling_ratio: float = 0.2
     bank: Bank = field(init=False, repr=False, compare=False)
 
     name: ClassVar[str] = "adaptive"
@@ -98,14 +103,28 @@ class Adaptive:
             raise ValueError(
                 f"calmness must lie in [{CALMNESS_MIN:g}, {CALMNESS_MAX:g}], got {self.calmness!r}"
             )
-        if self.action not in ("heat", "cool"):
-            raise ValueError(f"action must be 'heat' or 'cool', got {self.action!r}")
-        object.__setattr__(self, "bank", Bank(self.period_s))
+        if self.action not in ("heat", "cool", "heat-cool"):
+            raise ValueError(f"action must be 'heat', 'cool' or 'heat-cool', got {self.action!r}")
+        low, high = RATIO_MIN, RATIO_MAX
+        if not (is_finite_number(self.cooling_ratio) and low <= self.cooling_ratio <= high):
+            raise ValueError(
+                f"cooling_ratio must lie in [{low:g}, {high:g}], got {self.cooling_ratio!r}"
+            )
+        u_min = -self.cooling_ratio if self.action == "heat-cool" else 0.0
+        object.__setattr__(self, "bank", Bank(self.period_s, u_min))
 
     @property
     def _sign(self) -> float:
-        """+1 or -1: to a cooler everything looks upside down, but for its power."""
-        return 1.0 if self.action == "heat" else -1.0
+        """+1 or -1: to a lone cooler everything looks upside down, but for its power."""
+        return -1.0 if self.action == "cool" else 1.0
+
+    def _heat(self, power: float) -> float:
+        """Return the heat of `power` in units of the heater's: less where a cooler is weaker."""
+        return power * self.cooling_ratio if power < 0.0 else power
+
+    def _power(self, heat: float) -> float:
+        """Return the power that gives `heat`."""
+        return heat / self.cooling_ratio if heat < 0.0 else heat
 
     def start(self) -> AdaptiveBelief:
         """Return the belief before the first sample: nothing is known."""
@@ -132,13 +151,18 @@ class Adaptive:
         kept = remember(self.bank, belief.bank)
         return None if kept is None else {"action": self.action, **kept}
 
+    def origin(self, belief: AdaptiveBelief) -> str:
+        """Return whether what was remembered, if anything, is on trial, trusted or dropped."""
+        return belief.memory.origin
+
     def observe(self, belief: AdaptiveBelief, situation: Situation) -> AdaptiveBelief:
         """Return the belief after this sample, whoever steers."""
         h, interval_s = self.period_s, situation.interval_s
         behind_s, since_s = belief.behind_s + interval_s, belief.since_s + interval_s
-        given_s = belief.given_s + situation.applied * interval_s
+        applied = self._heat(situation.applied)
+        given_s = belief.given_s + applied * interval_s
         bank, memory = belief.bank, belief.memory
-        power = given_s / since_s if belief.since_s > 0.0 else situation.applied
+        power = given_s / since_s if belief.since_s > 0.0 else applied
         reading_c = self._sign * situation.measured_c
         if interval_s > max(UNKNOWN_S, UNKNOWN_PERIODS * h):
             bank, memory = trial.lost(self.bank, bank, memory)
@@ -159,7 +183,8 @@ class Adaptive:
             return belief, math.nan
         bounds = self.bank.bounds
         r_c = self._sign * setpoint_c
-        return belief, power_for(outlook, r_c, self.calmness, self.period_s, bounds)
+        heat = power_for(outlook, r_c, self.calmness, self.period_s, bounds)
+        return belief, self._power(heat)
 
     def surprise_k(self, belief: AdaptiveBelief, situation: Situation) -> float:
         """Return reading minus what the hypotheses expected; NaN beyond one period."""
@@ -181,12 +206,19 @@ class Adaptive:
         if rival is not None and rival.block is not None:  # on trial it is no better known than new
             rate_sd = max(rate_sd, gain(self.bank, rival)[1])
         known = holding_power_sd(bank) <= HOLDING_SD_MAX
-        holding_power = outlook.holding_power if known else None
+        holding_power = self._power(outlook.holding_power) if known else None
         return Beliefs(self._sign * rate, rate_sd, holding_power=holding_power, lag_s=outlook.lag_s)
 
     def plant(self, belief: AdaptiveBelief) -> PlantBelief | None:
         """Return everything believed of the plant; None before the first valid reading."""
-        return plant_belief(self.bank, belief.bank, self._sign)
+        told = plant_belief(self.bank, belief.bank, self._sign)
+        if told is None or not told.holding_power < 0.0:
+            return told
+        return replace(
+            told,
+            holding_power=self._power(told.holding_power),
+            holding_power_sd=told.holding_power_sd / self.cooling_ratio,
+        )
 
     def ride_s(self, belief: AdaptiveBelief) -> float:
         """Return three lags, at most 60 s; 0 before the first valid reading."""

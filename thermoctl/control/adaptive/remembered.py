@@ -86,7 +86,7 @@ def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBel
             raise ValueError(f"expected {name} {expected!r}, got {remembered.get(name)!r}")
     rate = _number(remembered, "gain_k_per_s", DRIFT_GAIN_MIN, GAIN_MAX)
     rate_sd = _number(remembered, "gain_sd_k_per_s", 0.0, KNOWN_SHARE * rate)
-    lost = _number(remembered, "loss_k_per_s", -LOSS_MIN * rate, LOSS_MAX * rate)
+    lost = _number(remembered, "loss_k_per_s", (bank.u_min - LOSS_MIN) * rate, LOSS_MAX * rate)
     lost_sd = _number(remembered, "loss_sd_k_per_s", 0.0, GAIN_MAX)
     variance = _number(remembered, "noise_variance_k2", 0.0, NOISE_MAX_K2)
     log = _log_weights(remembered, len(bank.hypotheses))

@@ -53,6 +53,13 @@ class Memory:
     verdict: str = ""
     text: str = ""
 
+    @property
+    def origin(self) -> str:
+        """What the bank that steers began with."""
+        if self.rival is not None:
+            return "trial"
+        return {TRUSTED: "stored", DROPPED: "dropped"}.get(self.verdict, "new")
+
 
 def met(
     law: Bank, bank: BankBelief, memory: Memory, y_c: float, applied: float

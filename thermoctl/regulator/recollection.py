@@ -1,0 +1,58 @@
+"""What outlives a restart of what controllers have learnt.
+
+A model that cannot be taken up costs nothing but itself: its law begins with nothing, as the first
+time, and an event says why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from types import MappingProxyType
+from typing import Any, Final
+
+from thermoctl.ports import Remembered, Remembering
+from thermoctl.regulator.guard import Failure, attempt
+from thermoctl.regulator.mind import Mind
+from thermoctl.regulator.supervisor import Emit
+
+NOTHING: Final[Mapping[str, Remembered]] = MappingProxyType({})
+"""What is remembered at a first start."""
+
+Models = Mapping[str, Mapping[str, Any]]
+
+
+def recall(minds: Iterable[Mind | None], remembered: Mapping[str, Remembered], emit: Emit) -> None:
+    """Let each of `minds` begin with what is remembered of its law."""
+    for mind in minds:
+        kept = None if mind is None else remembered.get(mind.name)
+        if mind is None or kept is None:
+            continue
+        begun = attempt(partial(mind.recall, kept))
+        if isinstance(begun, Failure):
+            emit("model.ignored", controller=mind.name, why=begun.text)
+        elif begun:
+            emit("model.recalled", controller=mind.name, age_s=round(kept.age_s))
+
+
+def origin(mind: Mind) -> str | None:
+    """Return what the model of `mind` began with; None of a law that remembers nothing."""
+    law = mind.controller
+    told = attempt(partial(law.origin, mind.belief)) if isinstance(law, Remembering) else None
+    return told if isinstance(told, str) else None
+
+
+def remembering(minds: Iterable[Mind | None]) -> Callable[[], Models]:
+    """Return a function that says what `minds` would like to be kept, as they are now."""
+    held = [(mind.controller, mind.belief) for mind in minds if mind is not None]
+    return partial(_remembered, held)
+
+
+def _remembered(held: Iterable[tuple[Any, Any]]) -> Models:
+    """Return what each law makes of its belief; nothing of one that fails."""
+    models: dict[str, Mapping[str, Any]] = {}
+    for law, belief in held:
+        told = attempt(partial(law.remember, belief)) if isinstance(law, Remembering) else None
+        if told is not None and not isinstance(told, Failure):
+            models[law.name] = told
+    return models
