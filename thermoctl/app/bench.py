@@ -222,8 +222,7 @@ class _LiveBench:
         elif action in DISTURBANCES:
             self._disturb(action)
         elif self._last is not None:
-            step = self._last.step
-            request = self._desk.press(action, step.mode, step.setpoint_c)
+            request = self._desk.press(action, self._last.step)
             if request is not None:
                 self._loop.ask(request, self._last.loop)
 

@@ -14,6 +14,7 @@ from typing import Any, Final, Protocol
 
 from thermoctl import __version__
 from thermoctl.app.cycle_record import cycle_record, iso_time
+from thermoctl.app.cycle_wire import details_of
 from thermoctl.runtime.asked import Asked
 from thermoctl.services.control_protocol import Call, CallError
 from thermoctl.services.control_socket import Pending
@@ -102,6 +103,10 @@ class Clerk:
     def record(self, cycle: Cycle) -> Mapping[str, Any]:
         """Return what a watching client is told of a finished cycle."""
         return cycle_record(cycle)
+
+    def details(self, cycle: Cycle) -> Mapping[str, Any]:
+        """Return the rest of a cycle, for a client that asked for details."""
+        return details_of(cycle)
 
     # -- which loop ------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Callable, Mapping
 from datetime import datetime
 from pathlib import Path
@@ -146,19 +147,40 @@ def controller(name: str, loop: str | None, socket: Path | None, as_json: bool) 
     _tell(told, as_json, lambda: f"controller {told['controller']}")
 
 
-@click.command(epilog=examples("thermoctl watch", "thermoctl watch --json"))
+@click.command(
+    epilog=examples("thermoctl watch", "thermoctl watch --lines", "thermoctl watch --json")
+)
 @loop_option
 @socket_option
+@click.option("--lines", is_flag=True, help="A line a cycle, on a terminal too.")
 @json_option
-def watch(loop: str | None, socket: Path | None, as_json: bool) -> int:
-    """Show every cycle as it is finished, until Ctrl-C."""
+def watch(loop: str | None, socket: Path | None, lines: bool, as_json: bool) -> int:
+    """Show every cycle as it is finished, until Ctrl-C.
+
+    On a terminal this is the live view of the loop, whose keys ask the daemon; elsewhere it is a
+    line a cycle.
+    """
     try:
-        with ControlClient(socket) as client:
-            for cycle in client.watch(loop):
-                click.echo(json.dumps(cycle) if as_json else _line(cycle))
+        if as_json or lines or not sys.stdout.isatty() or not _shown_live(socket, loop):
+            with ControlClient(socket) as client:
+                for cycle in client.watch(loop):
+                    click.echo(json.dumps(cycle) if as_json else _line(cycle))
     except KeyboardInterrupt:
         pass  # the one way to end it, and no failure
     return 0
+
+
+def _shown_live(socket: Path | None, loop: str | None) -> bool:
+    """Show the live view until the user leaves; return False where several loops are meant."""
+    from thermoctl.app.daemon_line import meet
+    from thermoctl.app.watch_view import watch_live
+
+    met = meet(socket, loop)
+    if isinstance(met, list):
+        click.echo(f"thermoctl: --loop NAME shows one of {', '.join(met)} in a view", err=True)
+        return False
+    watch_live(socket, met)
+    return True
 
 
 # -- asking ----------------------------------------------------------------------------------------

@@ -102,15 +102,33 @@ class ControlClient:
         NotRunning
             The daemon has gone.
         """
-        self.ask("watch", loop=loop)
+        return (cycle for cycle, _ in self._watched(loop, None))
+
+    def follow(self, loop: str) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any]]]:
+        """Yield record and details of every cycle of `loop` until the daemon ends.
+
+        Raises
+        ------
+        Refused
+            There is no such loop, or the daemon is too old to tell details.
+        NotRunning
+            The daemon has gone.
+        """
+        return self._watched(loop, True)
+
+    def _watched(
+        self, loop: str | None, details: bool | None
+    ) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any]]]:
+        self.ask("watch", loop=loop, details=details)
         self._connection.settimeout(None)
         while True:
             try:
-                cycle = self._next().get("cycle")
+                told = self._next()
             except OSError as error:
                 raise _gone() from error
+            cycle = told.get("cycle")
             if isinstance(cycle, dict):
-                yield cycle
+                yield cycle, told.get("details") or {}
 
     def _next(self) -> dict[str, Any]:
         line = self._lines.readline()

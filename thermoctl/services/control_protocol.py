@@ -33,6 +33,7 @@ class _Argument:
 
     name: str
     number: bool = False
+    flag: bool = False
     optional: bool = False
 
 
@@ -45,7 +46,7 @@ _ARGUMENTS: Final[Mapping[str, _Argument | None]] = {
     "controller": _Argument("name"),
     "alarms": None,
     "ack": _Argument("code", optional=True),
-    "watch": None,
+    "watch": _Argument("details", flag=True, optional=True),
 }
 
 
@@ -87,7 +88,7 @@ class Call:
     do: str
     call_id: Identity = None
     loop: str | None = None
-    argument: str | float | None = None
+    argument: str | float | bool | None = None
 
 
 def error_words(error: Mapping[str, Any]) -> str:
@@ -162,12 +163,16 @@ def _call(keys: Mapping[str, Any], call_id: Identity) -> Call:
     return Call(do, call_id, loop, None if argument is None else _value(argument, keys))
 
 
-def _value(argument: _Argument, keys: Mapping[str, Any]) -> str | float | None:
+def _value(argument: _Argument, keys: Mapping[str, Any]) -> str | float | bool | None:
     value = keys.get(argument.name)
     if value is None and argument.optional:
         return None
     if value is None:
         raise CallError("missing_key", f'a "{argument.name}"', "none")
+    if argument.flag:
+        if not isinstance(value, bool):
+            raise CallError("bad_value", f'"{argument.name}" to be true or false', value)
+        return value
     if not argument.number:
         return _text(argument.name, value)
     if isinstance(value, bool) or not is_finite_number(value):
@@ -202,9 +207,12 @@ def denied(call_id: Identity, error: CallError) -> bytes:
     return _line({"v": VERSION, "id": call_id, "ok": False, "error": error.error})
 
 
-def told(call_id: Identity, cycle: Mapping[str, Any]) -> bytes:
+def told(
+    call_id: Identity, cycle: Mapping[str, Any], details: Mapping[str, Any] | None = None
+) -> bytes:
     """Return the line a watching client gets for a finished cycle."""
-    return _line({"v": VERSION, "id": call_id, "cycle": cycle})
+    beside = {} if details is None else {"details": details}
+    return _line({"v": VERSION, "id": call_id, "cycle": cycle, **beside})
 
 
 def asking(call_id: Identity, do: str, keys: Mapping[str, Any]) -> bytes:

@@ -10,9 +10,9 @@ import select
 import threading
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any, Final, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 from thermoctl.errors import NotPermitted, Refused, Unavailable
 from thermoctl.services.control_line import ClientLine
@@ -54,6 +54,17 @@ class Answering(Protocol):
 
     def record(self, cycle: Cycle) -> Mapping[str, Any]:
         """Return what a watching client is told of a finished cycle."""
+
+    def details(self, cycle: Cycle) -> Mapping[str, Any]:
+        """Return the rest of a cycle, for a client that asked for details."""
+
+
+class _Told(NamedTuple):
+    """A finished cycle in words; the details are only there if anybody wants them."""
+
+    loop: str
+    record: Mapping[str, Any]
+    details: Mapping[str, Any] | None
 
 
 class ControlSocket:
@@ -149,9 +160,9 @@ class ControlSocket:
             for _ in range(NEWCOMERS):
                 connection, _ = listener.accept()
                 self._admit(ClientLine(connection, self._clock_s()))
-        lines = [self._cycle_for(cycle) for cycle in self._feed.take() if self._watching]
+        told_of = [self._told_of(cycle) for cycle in self._feed.take() if self._watching]
         for client in tuple(self._clients):
-            self._attend(client, lines)
+            self._attend(client, told_of)
 
     def _admit(self, client: ClientLine) -> None:
         """Take a newcomer in and hear it; where all places are taken, somebody makes room."""
@@ -166,19 +177,23 @@ class ControlSocket:
         talking = [each for each in self._clients if each not in self._watching]
         return max(talking, key=lambda each: each.rudeness(now_s, busy=each in self._pending))
 
-    def _cycle_for(self, cycle: Cycle) -> tuple[str, Mapping[str, Any]]:
-        return cycle.loop, self._answering.record(cycle)
+    def _told_of(self, cycle: Cycle) -> _Told:
+        """Return what watching clients are told, made once for all of them."""
+        wanted = any(call.argument for call in self._watching.values())
+        details = self._answering.details(cycle) if wanted else None
+        return _Told(cycle.loop, self._answering.record(cycle), details)
 
     # -- one client ------------------------------------------------------------------------------
 
-    def _attend(self, client: ClientLine, cycles: list[tuple[str, Mapping[str, Any]]]) -> None:
+    def _attend(self, client: ClientLine, cycles: Sequence[_Told]) -> None:
         """Hear one line of a client, answer it, send; drop a client that is done or too slow."""
         now_s = self._clock_s()
         busy = client in self._pending or client in self._watching
         watched = self._watching.get(client)
-        for loop, record in cycles if watched is not None else ():
-            if watched is not None and watched.loop in (None, loop):
-                client.say(told(watched.call_id, record))
+        for each in cycles if watched is not None else ():
+            if watched is not None and watched.loop in (None, each.loop):
+                details = each.details if watched.argument else None
+                client.say(told(watched.call_id, each.record, details))
         try:
             client.receive(now_s)
             line = None if client in self._pending else client.line()

@@ -32,6 +32,9 @@ class Answers:
     def record(self, cycle):
         return {"t_s": cycle.step.t_s, "more": "x" * self.record_size}
 
+    def details(self, cycle):
+        return {"reason": cycle.step.command.reason}
+
 
 class House:
     """A control socket whose turns a test makes, and the clients of it."""
@@ -188,6 +191,15 @@ def test_who_watches_is_told_of_every_cycle_from_then_on(house, cycle_at):
     first, *cycles = replies(watcher)
     assert first["ok"] is True
     assert [(each["id"], each["cycle"]["t_s"]) for each in cycles] == [(5, 2.0), (5, 3.0)]
+
+
+def test_details_go_to_who_asked_for_them_and_to_nobody_else(house, cycle_at):
+    plain = house.client(b'{"v":1,"id":5,"do":"watch"}\n')
+    curious = house.client(b'{"v":1,"id":6,"do":"watch","details":true}\n')
+    house.server.publish(cycle_at(1.0))
+    house.turns(2)
+    assert "details" not in replies(plain)[-1]
+    assert replies(curious)[-1]["details"] == {"reason": "control"}
 
 
 def test_a_watcher_that_reads_nothing_is_let_go_at_a_bound(house, cycle_at):

@@ -105,6 +105,16 @@ def test_lines_say_version_and_id_and_hold_no_nan():
         "x": None,
     }
     assert json.loads(told(1, {"power": 0.5})) == {"v": 1, "id": 1, "cycle": {"power": 0.5}}
+    assert json.loads(told(1, {"power": 0.5}, {"theta": [1.0]}))["details"] == {"theta": [1.0]}
     assert parse(asking(3, "get", {"key": "power", "loop": None}).rstrip()) == Call(
         "get", 3, None, "power"
     )
+
+
+def test_details_are_asked_for_by_true_and_by_nothing_else():
+    assert parse(call(do="watch", details=True)).argument is True
+    assert parse(call(do="watch")).argument is None
+    for wrong in (1, "yes", [True]):
+        with pytest.raises(CallError) as refused:
+            parse(call(do="watch", details=wrong))
+        assert refused.value.code == "bad_value"

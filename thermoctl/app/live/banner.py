@@ -65,7 +65,10 @@ def _told(view: View, look: Look, width: int) -> Text | None:
     if not words:
         return None
     bar = Role.RED_BAR if state in (State.LATCHED, State.SAFE) else Role.STALE_BAR
-    words.append(f"heater {numbers.power(view.accepted_power)}" if heated else "heater off")
+    if view.lost:
+        words.append("daemon gone · heater not known")
+    else:
+        words.append(f"heater {numbers.power(view.accepted_power)}" if heated else "heater off")
     left = "   ".join(filter(None, (view.facts.loop, _speed(view), " · ".join(words))))
     right = f"{_age(view)}   {_clock(view)}"
     if len(left) + len(right) >= width:
@@ -188,6 +191,7 @@ def one_line(view: View, look: Look, width: int) -> Text:
         words = [_clock(view), f"{step.state.value.upper()} {step.mode.value}"]
         words += ["PAUSED"] if view.paused else []
         words += ["STALE"] if view.stale else []
+        words += ["daemon gone"] if view.lost else []
         words += [numbers.temperature(view.temperature_c)]
         used = len("  ".join(words)) + 2
         reason = why(view, look, room - used)

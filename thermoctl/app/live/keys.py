@@ -22,6 +22,7 @@ class Action(StrEnum):
     SETPOINT_UP_MUCH = "setpoint-up-much"
     SETPOINT_DOWN_MUCH = "setpoint-down-much"
     MODE = "mode"
+    CONTROLLER = "controller"
     CONFIRM = "confirm"
     CANCEL = "cancel"
     COLD_WATER = "cold-water"
@@ -46,6 +47,7 @@ _KEYS: Mapping[bytes, Action] = {
     b"\x1b[b": Action.SETPOINT_DOWN_MUCH,
     b"\x1b[6~": Action.SETPOINT_DOWN_MUCH,
     b"m": Action.MODE,
+    b"c": Action.CONTROLLER,
     b"\r": Action.CONFIRM,
     b"\n": Action.CONFIRM,
     ESCAPE: Action.CANCEL,

@@ -135,7 +135,10 @@ class Recent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """One moment of a run: all that `thermoctl.app.live.render.render` needs."""
+    """One moment of a run: all that `thermoctl.app.live.render.render` needs.
+
+    `lost` says why nothing more is heard of the loop; empty while it is.
+    """
 
     facts: Facts
     now_s: float
@@ -149,6 +152,7 @@ class View:
     events: tuple[Sentence, ...]
     prompt: str = ""
     paused: bool = False
+    lost: str = ""
 
     @property
     def steered(self) -> bool:
@@ -163,8 +167,9 @@ class View:
 
     @property
     def stale(self) -> bool:
-        """Return whether nothing good has come for more than three periods."""
-        return self.step is not None and not self.age_s <= STALE_PERIODS * self.facts.period_s
+        """Return whether nothing good came for three periods, or nobody tells."""
+        late = not self.age_s <= STALE_PERIODS * self.facts.period_s
+        return self.step is not None and (late or bool(self.lost))
 
     @property
     def temperature_c(self) -> float:
@@ -267,7 +272,7 @@ class LiveModel:
         """Take an event that came by another way than a step."""
         self._events.append(sentence(event))
 
-    def view(self, now_s: float, prompt: str = "", *, paused: bool = False) -> View:
+    def view(self, now_s: float, prompt: str = "", *, paused: bool = False, lost: str = "") -> View:
         """Return what to show at loop time `now_s`, `prompt` in the row of keys."""
         cycle = self._cycle
         self._range_s = max(self._range_s, range_for(now_s - self._first_s))
@@ -284,6 +289,7 @@ class LiveModel:
             events=tuple(self._events),
             prompt=prompt,
             paused=paused,
+            lost=lost,
         )
 
     def _recent(self) -> Recent:

@@ -18,6 +18,9 @@ from thermoctl.app.live.sentences import Mark, Sentence
 
 LEAST_WIDTH, LEAST_HEIGHT = 80, 24
 
+_SPACINGS = ((0, " ", "  "), (0, " ", " "), (1, " ", " "), (2, " ", " "), (2, "", " "))
+"""Ways to set the keys, the roomiest first: how short the words are, what stands around them."""
+
 _MARK_ROLES = {Mark.WARNING: Role.AMBER, Mark.ALARM: Role.RED, Mark.CHANGE: Role.BLUE}
 
 
@@ -61,20 +64,33 @@ def _keys(view: View, look: Look, width: int) -> Text:
     """Return the row of keys, or the question that is open."""
     if view.prompt:
         return fitted(look.text((f" {view.prompt} ", Role.CHIP)), width)
-    tight = width < banner.ROOMY
-    keys = [("↑↓", "set" if tight else "set point"), ("m", "mode")]
+    row = look.text()
+    for short, before, after in _SPACINGS:
+        parts: list[Part] = []
+        for key, *lengths in _offered(view):
+            words = lengths[min(short, len(lengths) - 1)]
+            parts += [(f" {key} ", Role.CHIP), (f"{before}{words}{after}", Role.MUTE)]
+        if view.lost:
+            parts += [(f"asked again and again: {view.lost}", Role.TEXT)]
+        row = look.text(*parts)
+        if len(row.plain.rstrip()) <= width:
+            break
+    return fitted(row, width)
+
+
+def _offered(view: View) -> list[tuple[str, ...]]:
+    """Return the keys that do something now, each with its words, the shortest last."""
+    if view.lost:
+        return [("q", "quit")]
+    keys: list[tuple[str, ...]] = [("↑↓", "set point", "set"), ("m", "mode")]
+    if view.step is not None and view.step.shadow is not None:
+        keys += [("c", "controller", "controller", "law")]
     if view.facts.simulated:
-        keys += [("d", "cold" if tight else "cold water"), ("i", "ice")]
-        keys += [("s", "stir" if tight else "stirrer")]
+        keys += [("d", "cold water", "cold"), ("i", "ice"), ("s", "stirrer", "stirrer", "stir")]
     keys += [("a", "ack")]
     if view.facts.simulated:
         keys += [("space", "go on" if view.paused else "pause")]
-    keys += [("q", "quit")]
-    apart = " " if tight else "  "
-    parts: list[Part] = []
-    for key, words in keys:
-        parts += [(f" {key} ", Role.CHIP), (f" {words}{apart}", Role.MUTE)]
-    return fitted(look.text(*parts), width)
+    return [*keys, ("q", "quit")]
 
 
 def render(view: View, width: int, height: int, look: Look) -> list[Text]:

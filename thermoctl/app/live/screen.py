@@ -103,7 +103,13 @@ class LiveScreen:
                 signal.signal(*self._taken.popitem())
 
     def draw(
-        self, loop_s: float, prompt: str = "", *, paused: bool = False, at_once: bool = False
+        self,
+        loop_s: float,
+        prompt: str = "",
+        *,
+        paused: bool = False,
+        lost: str = "",
+        at_once: bool = False,
     ) -> bool:
         """Draw the model as of loop time `loop_s`; return whether it was time to.
 
@@ -115,6 +121,8 @@ class LiveScreen:
             A question to show instead of the keys.
         paused : bool
             Whether simulated time stands still.
+        lost : str
+            Why nothing more is heard of the loop; empty while it is.
         at_once : bool
             Draw even when the last picture is younger than `FASTEST_S`.
         """
@@ -124,7 +132,8 @@ class LiveScreen:
         width, height = self._terminal_size()
         small = width < LEAST_WIDTH or height < LEAST_HEIGHT
         self._due_s = now_s + (SMALL_S if small else FASTEST_S)
-        rows = render(self._model.view(loop_s, prompt, paused=paused), width, height, self._look)
+        view = self._model.view(loop_s, prompt, paused=paused, lost=lost)
+        rows = render(view, width, height, self._look)
         lines = [terminal_codes(row, self._look.colour) for row in rows]
         # Asking for the size at each picture notices a resize as soon as SIGWINCH would.
         if (width, height) != self._size:

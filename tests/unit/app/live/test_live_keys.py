@@ -4,6 +4,7 @@ import pty
 import termios
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +12,35 @@ from hypothesis import strategies as st
 from thermoctl.app.live.desk import DISTURBANCES, Desk
 from thermoctl.app.live.keys import Action, Keys, decode
 from thermoctl.app.live.model import Facts
-from thermoctl.signals import Acknowledge, Mode, SetPoint
+from thermoctl.signals import (
+    Acknowledge,
+    ChooseController,
+    Command,
+    Estimate,
+    Measurement,
+    Mode,
+    SetPoint,
+    State,
+    Step,
+)
+
+
+def at(setpoint_c: float = 37.5, mode: Mode = Mode.AUTO, shadow: str | None = None) -> Step:
+    """Return a step of a loop that holds `setpoint_c`."""
+    return Step(
+        t_s=0.0,
+        measurement=Measurement(0.0, 37.5),
+        mode=mode,
+        state=State.RUN,
+        setpoint_c=setpoint_c,
+        command=Command(0.0, 3.0, "control"),
+        controller="adaptive",
+        estimate=Estimate(np.zeros(0), np.zeros((0, 0))),
+        shadow=shadow,
+    )
+
+
+AUTO, OFF, MANUAL = at(), at(mode=Mode.OFF), at(mode=Mode.MANUAL)
 
 
 @pytest.mark.parametrize(
@@ -21,7 +50,7 @@ from thermoctl.signals import Acknowledge, Mode, SetPoint
         (b"\x1bOA\x1bOB", [Action.SETPOINT_UP, Action.SETPOINT_DOWN]),
         (b"\x1b[1;2A\x1b[1;2B", [Action.SETPOINT_UP_MUCH, Action.SETPOINT_DOWN_MUCH]),
         (b"\x1b[5~\x1b[6~", [Action.SETPOINT_UP_MUCH, Action.SETPOINT_DOWN_MUCH]),
-        (b"mdi", [Action.MODE, Action.COLD_WATER, Action.ICE]),
+        (b"mcdi", [Action.MODE, Action.CONTROLLER, Action.COLD_WATER, Action.ICE]),
         (b"sa q", [Action.STIRRER, Action.ACKNOWLEDGE, Action.PAUSE, Action.QUIT]),
         (b"\r\x03", [Action.CONFIRM, Action.QUIT]),
         (b"\x1bm", [Action.CANCEL, Action.MODE]),
@@ -103,55 +132,111 @@ def test_what_is_no_terminal_has_no_keys() -> None:
 
 def test_off_acts_at_once_and_every_other_mode_is_confirmed(facts: Facts) -> None:
     desk = Desk(facts)
-    assert desk.press(Action.MODE, Mode.MANUAL, 37.5) is Mode.OFF
+    assert desk.press(Action.MODE, MANUAL) is Mode.OFF
     assert desk.prompt == ""
-    assert desk.press(Action.MODE, Mode.OFF, 37.5) is None
+    assert desk.press(Action.MODE, OFF) is None
     assert "mode auto" in desk.prompt
-    assert desk.press(Action.CONFIRM, Mode.OFF, 37.5) is Mode.AUTO
+    assert desk.press(Action.CONFIRM, OFF) is Mode.AUTO
     assert desk.prompt == ""
-    assert desk.press(Action.CONFIRM, Mode.OFF, 37.5) is None
+    assert desk.press(Action.CONFIRM, OFF) is None
 
 
 def test_from_auto_two_strokes_are_off(facts: Facts) -> None:
     desk = Desk(facts)
-    assert desk.press(Action.MODE, Mode.AUTO, 37.5) is None
+    assert desk.press(Action.MODE, AUTO) is None
     assert "mode manual" in desk.prompt
-    assert desk.press(Action.MODE, Mode.AUTO, 37.5) is Mode.OFF
+    assert desk.press(Action.MODE, AUTO) is Mode.OFF
     assert desk.prompt == ""
 
 
 def test_a_proposed_mode_can_be_left(facts: Facts) -> None:
     desk = Desk(facts)
-    desk.press(Action.MODE, Mode.OFF, 37.5)
-    assert desk.press(Action.CANCEL, Mode.OFF, 37.5) is None
-    assert desk.press(Action.CONFIRM, Mode.OFF, 37.5) is None
+    desk.press(Action.MODE, OFF)
+    assert desk.press(Action.CANCEL, OFF) is None
+    assert desk.press(Action.CONFIRM, OFF) is None
+
+
+@pytest.fixture
+def shadowed() -> Step:
+    return at(shadow="self-tuning-mv")
+
+
+def test_the_shadow_takes_over_once_it_is_confirmed(facts: Facts, shadowed: Step) -> None:
+    desk = Desk(facts)
+    assert desk.press(Action.CONTROLLER, shadowed) is None
+    assert desk.prompt == "Enter: self-tuning-mv takes over   Esc: leave it"
+    assert desk.press(Action.CONFIRM, shadowed) == ChooseController("self-tuning-mv")
+    assert desk.prompt == ""
+    assert desk.press(Action.CONFIRM, shadowed) is None
+
+
+def test_a_proposed_controller_can_be_left(facts: Facts, shadowed: Step) -> None:
+    desk = Desk(facts)
+    desk.press(Action.CONTROLLER, shadowed)
+    assert desk.press(Action.CANCEL, shadowed) is None
+    assert desk.prompt == ""
+    assert desk.press(Action.CONFIRM, shadowed) is None
+
+
+def test_a_loop_without_a_shadow_has_nobody_to_propose(facts: Facts) -> None:
+    desk = Desk(facts)
+    assert desk.press(Action.CONTROLLER, AUTO) is None
+    assert desk.prompt == ""
+    assert desk.press(Action.CONFIRM, AUTO) is None
+
+
+def test_a_mode_takes_the_place_of_a_proposed_controller_and_the_other_way_round(
+    facts: Facts, shadowed: Step
+) -> None:
+    desk = Desk(facts)
+    desk.press(Action.CONTROLLER, shadowed)
+    assert desk.press(Action.MODE, shadowed) is None
+    assert desk.prompt.startswith("Enter: mode manual")
+    assert desk.press(Action.CONTROLLER, shadowed) is None
+    assert desk.press(Action.CONFIRM, shadowed) == ChooseController("self-tuning-mv")
+
+
+def test_off_acts_at_once_while_a_controller_is_proposed(facts: Facts) -> None:
+    desk, manual = Desk(facts), at(mode=Mode.MANUAL, shadow="pid")
+    desk.press(Action.CONTROLLER, manual)
+    assert desk.press(Action.MODE, manual) is Mode.OFF
+    assert desk.prompt == ""
+
+
+def test_a_refusal_is_told_until_the_next_key_and_strokes_begin_anew(facts: Facts) -> None:
+    desk = Desk(facts)
+    assert [desk.press(Action.SETPOINT_UP, AUTO) for _ in range(2)][-1] == SetPoint(37.7)
+    desk.refused("expected a set point from 5 to 37.5 degC, got 37.7")
+    assert desk.prompt == "Refused: expected a set point from 5 to 37.5 degC, got 37.7"
+    assert desk.press(Action.SETPOINT_DOWN, AUTO) == SetPoint(37.4)
+    assert desk.prompt == ""
 
 
 def test_strokes_add_up_before_the_loop_takes_the_first(facts: Facts) -> None:
     desk = Desk(facts)
-    asked = [desk.press(Action.SETPOINT_UP, Mode.AUTO, 37.5) for _ in range(3)]
+    asked = [desk.press(Action.SETPOINT_UP, AUTO) for _ in range(3)]
     assert asked == [SetPoint(37.6), SetPoint(37.7), SetPoint(37.8)]
-    assert desk.press(Action.SETPOINT_DOWN, Mode.AUTO, 20.0) == SetPoint(19.9)
+    assert desk.press(Action.SETPOINT_DOWN, at(20.0)) == SetPoint(19.9)
 
 
 def test_a_set_point_stays_within_its_limits(facts: Facts) -> None:
     desk = Desk(facts)
-    assert desk.press(Action.SETPOINT_UP_MUCH, Mode.AUTO, 59.5) == SetPoint(60.0)
-    assert desk.press(Action.SETPOINT_DOWN_MUCH, Mode.AUTO, 5.5) == SetPoint(5.0)
+    assert desk.press(Action.SETPOINT_UP_MUCH, at(59.5)) == SetPoint(60.0)
+    assert desk.press(Action.SETPOINT_DOWN_MUCH, at(5.5)) == SetPoint(5.0)
 
 
 def test_at_a_limit_nothing_is_asked_and_the_way_back_is_open(facts: Facts) -> None:
     desk = Desk(facts)
-    assert desk.press(Action.SETPOINT_UP, Mode.AUTO, 60.0) is None
-    assert desk.press(Action.SETPOINT_DOWN, Mode.AUTO, 60.0) == SetPoint(59.9)
-    assert desk.press(Action.SETPOINT_UP, Mode.AUTO, 60.0) == SetPoint(60.0)  # 59.9 is on its way
-    assert desk.press(Action.SETPOINT_UP, Mode.AUTO, 60.0) is None
+    assert desk.press(Action.SETPOINT_UP, at(60.0)) is None
+    assert desk.press(Action.SETPOINT_DOWN, at(60.0)) == SetPoint(59.9)
+    assert desk.press(Action.SETPOINT_UP, at(60.0)) == SetPoint(60.0)  # 59.9 is on its way
+    assert desk.press(Action.SETPOINT_UP, at(60.0)) is None
 
 
 def test_acknowledging_asks_for_all_alarms_and_a_disturbance_asks_the_loop_nothing(
     facts: Facts,
 ) -> None:
     desk = Desk(facts)
-    assert desk.press(Action.ACKNOWLEDGE, Mode.AUTO, 37.5) == Acknowledge()
+    assert desk.press(Action.ACKNOWLEDGE, AUTO) == Acknowledge()
     for action in (*DISTURBANCES, Action.PAUSE, Action.QUIT):
-        assert desk.press(action, Mode.AUTO, 37.5) is None
+        assert desk.press(action, AUTO) is None

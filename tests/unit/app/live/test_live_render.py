@@ -388,6 +388,38 @@ def test_keys_that_disturb_are_offered_on_a_simulation_only(
     assert "SIM" not in rows[0]
 
 
+def shadowed(cycle: Cycle) -> Cycle:
+    return replace(cycle, step=replace(cycle.step, shadow="on-off", shadow_power=0.25))
+
+
+@pytest.mark.parametrize("look", [PLAIN, Look(Colour.NONE, utf8=False)])
+@pytest.mark.parametrize("width", [80, 90, 100, 140])
+def test_no_key_is_cut_off_and_the_controller_s_is_there_with_a_shadow_only(
+    model: LiveModel, make_cycle: MakeCycle, width: int, look: Look
+) -> None:
+    model.feed(make_cycle(0.0))
+    row = texts(model.view(0.0), width, 24, look)[-1]
+    assert " c " not in row
+    assert row.rstrip().endswith("quit")
+    model.feed(shadowed(make_cycle(1.0)))
+    row = texts(model.view(1.0, paused=True), width, 24, look)[-1]
+    assert " c controller " in " ".join(row.split()) or " c law " in " ".join(row.split())
+    assert row.rstrip().endswith("quit")
+
+
+def test_a_daemon_that_has_gone_leaves_one_key_and_nothing_known(
+    facts: Facts, make_cycle: MakeCycle
+) -> None:
+    model = LiveModel(replace(facts, simulated=False))
+    model.feed(shadowed(make_cycle(0.0)))
+    for width, height in ((80, 24), (100, 30)):
+        rows = texts(model.view(1.0, lost="it has ended"), width, height)
+        assert "STALE since 14:00:00 · daemon gone · heater not known" in rows[0]
+        assert " ".join(rows[-1].split()) == "q quit asked again and again: it has ended"
+        assert "╱" not in "".join(texts(model.view(1.0), width, height))
+    assert "STALE  daemon gone" in texts(model.view(1.0, lost="it has ended"), 79, 1)[0]
+
+
 def test_an_empty_view_says_so(model: LiveModel) -> None:
     picture = "\n".join(texts(model.view(0.0)))
     assert "waiting for the first sample" in picture
