@@ -30,6 +30,7 @@ from thermoctl.services.history.schema import RunInfo
 from thermoctl.services.history.writer import HistoryWriter
 from thermoctl.services.journal import Journal, sink_for
 from thermoctl.services.latches import LatchKeeper
+from thermoctl.services.learned import LearnedStore, ModelKeeper, remembered_models
 from thermoctl.services.lock import DaemonLock, device_lock_path
 from thermoctl.services.notify import Notifier, watchdog_interval_s
 from thermoctl.services.places import make_private, runtime_dir, state_dir
@@ -108,11 +109,14 @@ class Daemon:
                 report=self._journal.emit,
             )
         self._resumption = Resumption(directory, self._emit)
+        learned = LearnedStore(directory)
+        self._models = ModelKeeper(learned, self._clock.now_s)
         self._loop = loop_for(
             self._resumption.settings(settings),
             self._clock,
             self._publish,
             latched=kept_latches(self._latches, settings, self._emit),
+            remembered=remembered_models(learned, settings.loops, self._emit),
             completed=self._completed,
         )
         self._keeper = LatchKeeper(
@@ -168,6 +172,7 @@ class Daemon:
                 self._say_the_rest()
                 self._emit("loop.stopped", None, **self._ends())
             self._resumption.store(self._settings, dict(self._seen.cycles))
+            self._models.store(dict(self._seen.cycles), at_end=True)
         return self._off and not self._failed
 
     def _control(self) -> None:
@@ -208,6 +213,7 @@ class Daemon:
                 self._reloading = False
                 self._reload()
             self._resumption.store(self._settings, dict(self._seen.cycles))
+            self._models.store(dict(self._seen.cycles))
 
     def _note_signal(self, number: int, frame: object) -> None:
         """Only set flags: this runs in the middle of whatever the main thread is doing.

@@ -1,4 +1,4 @@
-"""Where a start takes up what the last run left: modes, set points and latches.
+"""Where a start takes up what the last run left: modes, set points, controllers, latches.
 
 A restarted loop is off unless its configuration says ``resume = true``. What is edited in the
 configuration since is a newer wish than what was stored, and counts as a first start.
@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
+from thermoctl.app import plugins
 from thermoctl.app.compose import started_as
 from thermoctl.app.settings import Settings
 from thermoctl.app.tables import LoopTable
@@ -37,14 +39,29 @@ class Resumption:
         self._stored: dict[str, RunRecord] = {}
 
     def settings(self, settings: Settings) -> Settings:
-        """Return `settings` with the modes and set points this start begins with."""
-        starts = {name: self._start(name, table) for name, table in settings.loops.items()}
-        return started_as(settings, starts)
+        """Return `settings` with modes, set points and laws this start begins with."""
+        starts, loops = {}, {}
+        for name, table in settings.loops.items():
+            record, warning = self._runs.load(name)
+            if warning is not None:
+                self._emit("state.ignored", name, why=warning)
+            starts[name] = self._start(name, table, record)
+            loops[name] = self._exchanged(name, table, record)
+        return started_as(settings.model_copy(update={"loops": loops}), starts)
 
-    def _start(self, name: str, table: LoopTable) -> tuple[Mode, float]:
-        record, warning = self._runs.load(name)
-        if warning is not None:
-            self._emit("state.ignored", name, why=warning)
+    def _exchanged(self, name: str, table: LoopTable, record: RunRecord | None) -> LoopTable:
+        """Return `table` with the laws as the operator had exchanged them, if so."""
+        if record is None or not (table.resume and record.exchanged):
+            return table
+        if record.configured_laws != _laws(table):
+            return table
+        exchanged = table.model_copy(
+            update={"controller": table.shadow, "shadow": table.controller}
+        )
+        self._emit("controller.resumed", name, controller=exchanged.controller.kind)
+        return exchanged
+
+    def _start(self, name: str, table: LoopTable, record: RunRecord | None) -> tuple[Mode, float]:
         if record is None:
             return table.mode, table.setpoint_c
         setpoint_c = _setpoint(record, table)
@@ -62,7 +79,10 @@ class Resumption:
         """Store what changed; a full or read-only disk is tried again at the next call."""
         for name, cycle in cycles.items():
             record = RunRecord(cycle.step.mode, cycle.step.setpoint_c)
-            record = _configured(record, settings.loops[name])
+            table = settings.loops[name]
+            record = replace(
+                _configured(record, table), exchanged=_in_shadow(table, cycle.step.controller)
+            )
             if self._stored.get(name) != record:
                 with contextlib.suppress(OSError):
                     self._runs.save(name, record)
@@ -78,7 +98,25 @@ def _setpoint(record: RunRecord, table: LoopTable) -> float:
 
 
 def _configured(record: RunRecord, table: LoopTable) -> RunRecord:
-    return RunRecord(record.mode, record.setpoint_c, table.mode, table.setpoint_c)
+    return replace(
+        record,
+        configured_mode=table.mode,
+        configured_setpoint_c=table.setpoint_c,
+        configured_laws=_laws(table),
+    )
+
+
+def _laws(table: LoopTable) -> tuple[str, ...]:
+    """Return the kinds in charge and in shadow, as configured."""
+    return tuple(each.kind for each in (table.controller, table.shadow) if each is not None)
+
+
+def _in_shadow(table: LoopTable, name: str) -> bool:
+    """Return whether the law called `name` is the one that is configured as the shadow."""
+    if table.shadow is None:
+        return False
+    law = plugins.find(plugins.CONTROLLERS, table.shadow.kind)
+    return name == getattr(law, "name", table.shadow.kind)
 
 
 def kept_latches(latches: LatchStore, settings: Settings, emit: Emit) -> dict[str, Alarm]:

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 from thermoctl.control.autotune import AutoTune, Experiment, Found, GivenUp, Tuning
-from thermoctl.control.pid_remembered import as_remembered, found_before
 from thermoctl.control.mirror import mirrored
+from thermoctl.control.pid_remembered import as_remembered, found_before
 from thermoctl.control.pid_terms import PidTerms, Terms
 from thermoctl.control.relay import RelayTest
 from thermoctl.control.simc import Gains
@@ -144,7 +144,7 @@ class Pid:
         return PidBelief()
 
     def start_from(self, remembered: Mapping[str, Any], age_s: float) -> PidBelief:
-        """Return the belief before the first sample, with the gains that an earlier run has found.
+        """Return the belief before the first sample, with gains of an earlier run.
 
         With `tuning` simc they hold until a warm-up tells anew, so that a plant that has changed
         meanwhile is found out at the first one. With relay there is no swing any more.

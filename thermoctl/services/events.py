@@ -71,6 +71,7 @@ _BY_LEVEL: Final = {
         "config.loaded",
         "controller.changed",
         "controller.detuned",
+        "controller.resumed",
         "controller.tuned",
         "controller.tuning",
         "history.recovered",

@@ -260,16 +260,22 @@ class RunRecord:
         What the operator wanted last.
     configured_mode, configured_setpoint_c
         What the configuration said then; an edited one is a newer wish. None: not known.
+    exchanged : bool
+        Whether the operator had put the controller in shadow in charge.
+    configured_laws : tuple of str
+        Kinds in charge and in shadow, as configured then.
     """
 
     mode: Mode
     setpoint_c: float
     configured_mode: Mode | None = None
     configured_setpoint_c: float | None = None
+    exchanged: bool = False
+    configured_laws: tuple[str, ...] = ()
 
 
 class RunStore:
-    """The last mode and set point of every loop."""
+    """The last mode, set point and controller of every loop."""
 
     def __init__(self, directory: Path, wall_clock: Callable[[], float] = time.time) -> None:
         self._store = StateStore(directory, wall_clock)
@@ -302,7 +308,12 @@ def _as_run(document: Mapping[str, Any]) -> RunRecord:
     if document.get("configured_mode") is None:
         return RunRecord(mode, setpoint_c)
     configured = Mode(str(document["configured_mode"]))
-    return RunRecord(mode, setpoint_c, configured, _finite(document, "configured_setpoint_c"))
+    configured_c = _finite(document, "configured_setpoint_c")
+    laws = document.get("configured_laws", [])
+    if not (isinstance(laws, list) and all(isinstance(each, str) for each in laws)):
+        raise ValueError(f"expected configured_laws, names, got {laws!r}")
+    exchanged = document.get("exchanged") is True
+    return RunRecord(mode, setpoint_c, configured, configured_c, exchanged, tuple(laws))
 
 
 def _latch(loop: str) -> str:

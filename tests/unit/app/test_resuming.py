@@ -15,6 +15,7 @@ class Seen:
 
     mode: Mode
     setpoint_c: float
+    controller: str = "adaptive"
 
     @property
     def step(self):
@@ -84,3 +85,50 @@ def test_an_edited_set_point_is_newer_than_a_stored_one(starts):
 def test_a_stored_set_point_outside_today_s_limits_is_not_taken(starts):
     starts.start(then=Seen(Mode.AUTO, 55.0), resume=True)
     assert starts.start(resume=True, setpoint_max_c=50.0) == (Mode.AUTO, 30.0)
+
+
+SWAPPED = Seen(Mode.AUTO, 30.0, controller="pid")
+LAWS = {"controller": "adaptive", "shadow": "pid", "resume": True}
+
+
+def begun_laws(starts, **keys):
+    """Return the laws in charge and in shadow of a start, which tells what it resumed."""
+    loop = {"setpoint_c": 30.0, "trip_above_c": 60.0, "mode": "auto"} | keys
+    resumption = Resumption(starts.folder, lambda name, *_, **fields: starts.told.append(name))
+    table = resumption.settings(load({"loops": {"tank": loop}})).loops["tank"]
+    return table.controller.kind, None if table.shadow is None else table.shadow.kind
+
+
+def test_a_controller_that_was_put_in_charge_stays_there_over_a_restart(starts):
+    starts.start(then=SWAPPED, **LAWS)
+    assert begun_laws(starts, **LAWS) == ("pid", "adaptive")
+    assert starts.told == ["controller.resumed"]
+
+
+def test_one_that_was_put_back_is_back(starts):
+    starts.start(then=SWAPPED, **LAWS)
+    starts.start(then=Seen(Mode.AUTO, 30.0, controller="adaptive"), **LAWS)
+    assert begun_laws(starts, **LAWS) == ("adaptive", "pid")
+
+
+def test_a_restart_that_does_not_resume_has_the_laws_as_configured(starts):
+    starts.start(then=SWAPPED, **LAWS)
+    assert begun_laws(starts, **LAWS | {"resume": False}) == ("adaptive", "pid")
+
+
+@pytest.mark.parametrize(
+    "edited", [{"controller": "on-off"}, {"shadow": "on-off"}, {"shadow": None}], ids=str
+)
+def test_laws_that_were_edited_since_are_the_newer_wish(starts, edited):
+    starts.start(then=SWAPPED, **LAWS)
+    keys = {name: value for name, value in (LAWS | edited).items() if value is not None}
+    assert begun_laws(starts, **keys) == (keys["controller"], keys.get("shadow"))
+    assert "controller.resumed" not in starts.told
+
+
+def test_a_record_of_laws_that_is_none_is_ignored_with_a_warning(starts):
+    starts.start(then=SWAPPED, **LAWS)
+    (path,) = starts.folder.glob("run-*.json")
+    path.write_text(path.read_text().replace('"adaptive",', "7,"))
+    assert begun_laws(starts, **LAWS) == ("adaptive", "pid")
+    assert starts.told == ["state.ignored"]

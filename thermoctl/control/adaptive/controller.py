@@ -131,7 +131,7 @@ class Adaptive:
         return AdaptiveBelief(self.bank.start())
 
     def start_from(self, remembered: Mapping[str, Any], age_s: float) -> AdaptiveBelief:
-        """Return the belief before the first sample, with a model of an earlier run on trial.
+        """Return the belief before the first sample, a remembered model on trial.
 
         Raises
         ------
@@ -145,14 +145,14 @@ class Adaptive:
         return AdaptiveBelief(bank, memory=Memory(rival))
 
     def remember(self, belief: AdaptiveBelief) -> Mapping[str, Any] | None:
-        """Return gain, loss, noise and weights; None until they are known, and during a trial."""
+        """Return gain, loss, noise and weights; None until known, or on trial."""
         if belief.memory.rival is not None or belief.doubt.stands:
             return None
         kept = remember(self.bank, belief.bank)
         return None if kept is None else {"action": self.action, **kept}
 
     def origin(self, belief: AdaptiveBelief) -> str:
-        """Return whether what was remembered, if anything, is on trial, trusted or dropped."""
+        """Return what the bank that steers began with."""
         return belief.memory.origin
 
     def observe(self, belief: AdaptiveBelief, situation: Situation) -> AdaptiveBelief:
@@ -226,7 +226,7 @@ class Adaptive:
         return 0.0 if outlook is None else min(RIDE_LAGS * outlook.lag_s, RIDE_MAX_S)
 
     def remarks(self, belief: AdaptiveBelief) -> Mapping[str, str]:
-        """Return whether power seems to warm nothing, and the verdict on a remembered model."""
+        """Return whether power warms nothing, and the verdict on what was remembered."""
         remarks, memory = {}, belief.memory
         if belief.doubt.stands:  # no heater, or one wired to cool
             remarks["controller.gain_doubtful"] = belief.doubt.text

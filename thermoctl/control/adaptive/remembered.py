@@ -38,10 +38,11 @@ from thermoctl.quantities import Array, is_finite_number
 KNOWN_SHARE = 0.25
 """A gain is known, and worth keeping, once its deviation is at most this share of it."""
 
-GAIN_SHARE = 0.1
-"""A gain comes back with at least this share of it as its deviation."""
-LOSS_SHARE = 0.1
-"""And a loss with this share of the gain: it depends on temperature and surroundings."""
+GAIN_SHARE = 0.2
+"""A gain comes back with at least this share of it as its deviation: water is added and taken."""
+LOSS_SHARE = 0.05
+"""And a loss with this share of the gain: it depends on temperature and surroundings. With twice as
+much, the loss takes the blame for a gain that is too high."""
 DOUBLED_S = 14 * 86400.0
 """After such a time the variance of the gain is twice as large; it grows with time from there."""
 WEIGHT_POWER = 0.5
@@ -63,6 +64,7 @@ def remember(bank: Bank, belief: BankBelief) -> dict[str, Any] | None:
         return None
     return {
         "period_s": bank.period_s,
+        "u_min": bank.u_min,
         "hypotheses": _hypotheses(),
         "gain_k_per_s": _rounded(rate),
         "gain_sd_k_per_s": _rounded(rate_sd),
@@ -81,7 +83,8 @@ def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBel
     ValueError
         It is of another bank, or no plant could be like that; the text says what was expected.
     """
-    for name, expected in (("period_s", bank.period_s), ("hypotheses", _hypotheses())):
+    of = {"period_s": bank.period_s, "u_min": bank.u_min, "hypotheses": _hypotheses()}
+    for name, expected in of.items():
         if remembered.get(name) != expected:
             raise ValueError(f"expected {name} {expected!r}, got {remembered.get(name)!r}")
     rate = _number(remembered, "gain_k_per_s", DRIFT_GAIN_MIN, GAIN_MAX)
