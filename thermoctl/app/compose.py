@@ -25,7 +25,8 @@ from thermoctl.ports import Board, Clock, Remembered
 from thermoctl.regulator import Regulator
 from thermoctl.regulator.recollection import NOTHING
 from thermoctl.runtime.connection import Connection
-from thermoctl.runtime.loop import Loop, Publish, Wiring
+from thermoctl.runtime.loop import Loop, Publish
+from thermoctl.runtime.wiring import Output, Wiring
 from thermoctl.signals import Alarm, Mode
 
 _WRITE_TIMEOUT_S = 0.5
@@ -166,7 +167,11 @@ def wiring_errors(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
     for (used, output), names in driven.items():
         if len(names) > 1:
             text = f"expected one loop for output {output!r} of {used!r}, got {', '.join(names)}"
-            yield ("loops", names[1], "actuator"), text
+            part = "actuator"
+            if names[0] == names[1]:
+                text = f"expected another output than the heater's, got {output!r} of {used!r} too"
+                part = "cooler"
+            yield ("loops", names[1], part), text
     for name, board in settings.boards.items():
         dead_man_s = getattr(board, "dead_man_s", math.inf)
         if dead_man_s <= max(periods):
@@ -185,15 +190,15 @@ def _outputs(settings: Settings) -> dict[tuple[str, str], list[str]]:
     """Return the loops that drive each output of each board."""
     driven: dict[tuple[str, str], list[str]] = {}
     for name, table in settings.loops.items():
-        if table.actuator is not None:
-            driven.setdefault((table.actuator.board, table.actuator.output), []).append(name)
+        for each in table.outputs:
+            driven.setdefault((each.board, each.output), []).append(name)
     return driven
 
 
 def _wiring(
     name: str, table: LoopTable, boards: dict[str, Connection], regulator: Regulator
 ) -> Wiring:
-    sensor, actuator = table.sensor, table.actuator
+    sensor, actuator, cooler = table.sensor, table.actuator, table.cooler
     if sensor is None or actuator is None:
         raise ConfigError(f"loop {name!r} needs a sensor and an actuator to run")
     return Wiring(
@@ -205,6 +210,7 @@ def _wiring(
         boards[actuator.board],
         actuator.output,
         law_for(actuator),
+        None if cooler is None else Output(boards[cooler.board], cooler.output, law_for(cooler)),
     )
 
 

@@ -30,6 +30,8 @@ from thermoctl.model.arx import Arx, KnownGain
 from thermoctl.ports import Controller, Estimator
 from thermoctl.regulator import Limits, Plan
 
+HEAT, COOL, HEAT_COOL = "heat", "cool", "heat-cool"
+
 _ROOM_C = 25.0
 _HALVINGS = 50
 _ARX_EXCITATION_MIN = 0.1
@@ -55,8 +57,11 @@ def plan_for(table: LoopTable) -> Plan:
             shadow = _controller(table, table.shadow, structure)
     with _within("estimator", table.estimator):
         identifier = _identifier(table, structure, _reference_time_s(controller, shadow))
+    for name, law in (("controller", controller), ("shadow", shadow)):
+        _check_action(table, name, law, controller)
     with _within("", table):
-        return Plan(_limits(table), identifier, controller, table.setpoint_c, table.mode, shadow)
+        limits = _limits(table, controller)
+        return Plan(limits, identifier, controller, table.setpoint_c, table.mode, shadow)
 
 
 def check_parts(table: LoopTable) -> None:
@@ -64,8 +69,29 @@ def check_parts(table: LoopTable) -> None:
     plan_for(table)
     if table.sensor is not None:
         _check_reach(table, sensor_for(table.sensor))
-    if table.actuator is not None:
-        law_for(table.actuator)
+    for output in table.outputs:
+        law_for(output)
+
+
+def action_of(controller: Controller) -> str:
+    """Return what power does to the plant; a law without a word of it heats."""
+    return str(getattr(controller, "action", HEAT))
+
+
+def _check_action(loop: LoopTable, name: str, law: Controller | None, charge: Controller) -> None:
+    """Refuse a law that takes the actuators for something else than they are."""
+    if law is None:
+        return
+    path, action = (name, "action"), action_of(law)
+    if loop.cooler is None and action == HEAT_COOL:
+        raise BadOption(f"{HEAT_COOL!r} needs a table [loops.NAME.cooler]", path)
+    if loop.cooler is not None and action != HEAT_COOL:
+        raise BadOption(
+            f"expected {HEAT_COOL!r} of a loop that has a cooler, {law.name} is for {action!r}",
+            path,
+        )
+    if action != action_of(charge):
+        raise BadOption(f"expected {action_of(charge)!r} as in charge, got {action!r}", path)
 
 
 def _check_reach(table: LoopTable, sensor: curves.Sensor) -> None:
@@ -119,8 +145,9 @@ def _within(name: str, table: BaseModel) -> Iterator[None]:
         raise BadOption(blamed.text, above + blamed.path) from error
 
 
-def _limits(table: LoopTable) -> Limits:
+def _limits(table: LoopTable, controller: Controller) -> Limits:
     low_c, high_c = table.setpoint_range_c
+    cooler = table.cooler
     return Limits(
         trip_above_c=table.trip_above_c,
         trip_below_c=table.trip_below_c,
@@ -131,6 +158,9 @@ def _limits(table: LoopTable) -> Limits:
         rise_per_s=table.rise_limit_per_s,
         jump_k=table.jump_k if "jump_k" in table.model_fields_set else _jump_k(table),
         jump_widens="jump_k" not in table.model_fields_set,
+        power_min=0.0 if cooler is None else -cooler.power_max,
+        changeover_s=0.0 if cooler is None else cooler.changeover_s,
+        power_cools=action_of(controller) == COOL,
     )
 
 

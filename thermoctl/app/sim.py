@@ -9,6 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from thermoctl.app.compose import loop_for, started_as
+from thermoctl.app.parts import COOL, action_of, plan_for
 from thermoctl.app.settings import Settings, load
 from thermoctl.app.tables import LoopTable, SensorTable
 from thermoctl.errors import ConfigError
@@ -19,6 +20,7 @@ from thermoctl_drivers.simulated import SimulatedSettings
 
 WATER_J_PER_LK = 4186.0  # heat of a litre of water, in J/K
 _STAND_IN_W = 1500.0
+_COOLER = {"output": "cooler", "law": "linear"}
 _VOLUMES_L, _POWERS_W = (0.5, 200.0), (50.0, 5000.0)
 
 
@@ -109,7 +111,12 @@ def stand_ins(settings: Settings) -> dict[str, SimulatedSettings]:
 
 def _tank_for(board: str, settings: Settings, mains_hz: float) -> SimulatedSettings:
     for loop, table in settings.loops.items():
-        if table.actuator is not None and table.actuator.board == board:
+        if any(each.board == board for each in table.outputs):
+            if len({each.board for each in table.outputs}) > 1:
+                raise ConfigError(
+                    f"loop {loop!r} cannot be simulated: expected its heater and its cooler on one "
+                    f"board, got {', '.join(each.board for each in table.outputs)}"
+                )
             litres = _STAND_IN_W / (WATER_J_PER_LK * table.model.gain_k_per_s)
             volume_l = clamp(litres, *_VOLUMES_L)
             heater_w = clamp(WATER_J_PER_LK * volume_l * table.model.gain_k_per_s, *_POWERS_W)
@@ -117,8 +124,10 @@ def _tank_for(board: str, settings: Settings, mains_hz: float) -> SimulatedSetti
                 return SimulatedSettings(
                     volume_l=volume_l,
                     heater_w=heater_w,
+                    cooler_w=heater_w * _cooling_share(table),
+                    ice_kg=0.0 if _cooling_share(table) else None,
                     bits=12,
-                    power_stage=table.actuator.law,
+                    power_stage=table.outputs[0].law,
                     mains_hz=mains_hz,
                 )
             except ValidationError as error:
@@ -133,5 +142,17 @@ def _rewired(table: LoopTable, tanks: Mapping[str, SimulatedSettings]) -> LoopTa
         reference_v = tanks[sensor.board].reference_v
         sensor = SensorTable(board=sensor.board, curve="lm335", reference_v=reference_v)
     if actuator is not None and actuator.board in tanks:
-        actuator = actuator.model_copy(update={"output": "heater"})
-    return table.model_copy(update={"sensor": sensor, "actuator": actuator})
+        alone = action_of(plan_for(table).controller) == COOL
+        actuator = actuator.model_copy(update=_COOLER if alone else {"output": "heater"})
+    cooler = table.cooler
+    if cooler is not None and cooler.board in tanks:
+        cooler = cooler.model_copy(update=_COOLER)
+    return table.model_copy(update={"sensor": sensor, "actuator": actuator, "cooler": cooler})
+
+
+def _cooling_share(table: LoopTable) -> float:
+    """Return what a stand-in's cooler takes out over what its heater brings in; 0: none."""
+    controller = plan_for(table).controller
+    if action_of(controller) == COOL:
+        return 1.0
+    return 0.0 if table.cooler is None else float(getattr(controller, "cooling_ratio", 1.0))

@@ -81,6 +81,20 @@ class ActuatorTable(Table):
     cycles: int = Field(50, ge=1, description="Mains cycles of one burst, for law burst.")
 
 
+class CoolerTable(ActuatorTable):
+    """Table ``[loops.NAME.cooler]``: the output of a power below 0, which cools."""
+
+    output: str = Field("cooler", description="Channel of the board.")
+    power_max: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
+        1.0, description="Most of its power ever given, as a fraction."
+    )
+    changeover_s: Annotated[float, Field(ge=0.0, le=3600.0)] = Field(
+        0.0,
+        description="How long heater and cooler are both off before the other one begins; never "
+        "less than a period.",
+    )
+
+
 class GuardsTable(Table):
     """Table ``[loops.NAME.estimator.guards]``: what keeps learning sound for years."""
 
@@ -171,8 +185,8 @@ class LoopTable(Table):
     """Table ``[loops.NAME]``: what is held, how often, and within which limits."""
 
     setpoint_c: Celsius = Field(description="Temperature to hold.")
-    trip_above_c: Celsius = Field(description="Heater off for good above this.")
-    trip_below_c: Celsius = Field(-10.0, description="Heater off for good below this.")
+    trip_above_c: Celsius = Field(description="Everything off for good above this.")
+    trip_below_c: Celsius = Field(-10.0, description="Everything off for good below this.")
     setpoint_min_c: Celsius | None = Field(None, description="Least set point; the trip if absent.")
     setpoint_max_c: Celsius | None = Field(
         None, description="Highest set point; the trip if absent."
@@ -185,7 +199,9 @@ class LoopTable(Table):
     power_max: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
         1.0, description="Most power ever given, as a fraction."
     )
-    rise_per_s: Positive | None = Field(None, description="Most the power may rise in a second.")
+    rise_per_s: Positive | None = Field(
+        None, description="Most the power may move away from 0 in a second."
+    )
     jump_k: Positive = Field(
         1.0,
         description="A reading farther off than this may be an outlier; left out, it is at least "
@@ -194,6 +210,7 @@ class LoopTable(Table):
     )
     sensor: SensorTable | None = None
     actuator: ActuatorTable | None = None
+    cooler: CoolerTable | None = None
     controller: Options = Field(
         default_factory=lambda: Options(kind="adaptive"),
         description="Law in charge in mode auto: a kind, or a table with a kind and its options.",
@@ -238,6 +255,11 @@ class LoopTable(Table):
                 f"below trip_above_c {self.trip_above_c:g}"
             )
         return self
+
+    @property
+    def outputs(self) -> tuple[ActuatorTable, ...]:
+        """The outputs that this loop drives, the heater's or the only one first."""
+        return tuple(each for each in (self.actuator, self.cooler) if each is not None)
 
     @property
     def weighs_orders(self) -> bool:

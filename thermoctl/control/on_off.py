@@ -1,4 +1,4 @@
-"""Full power below the set point, none above: a thermostat with hysteresis.
+"""Full power on one side of the set point, none beyond: a thermostat with hysteresis.
 
 Implements section 6 of ``docs/theory.md``.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from thermoctl.ports import Situation
 from thermoctl.quantities import is_finite_number
@@ -19,26 +19,31 @@ from thermoctl.signals import Beliefs
 class OnOff:
     """Switch on half a hysteresis below the set point and off half a one above it.
 
-    Its belief is whether it is on.
+    One that cools switches on above and off below. Its belief is whether it is on.
 
     Parameters
     ----------
     hysteresis_k : float
         Width of the band in which nothing is switched, in K; at least 0.
+    action : {'heat', 'cool'}
+        What power does to the plant.
 
     Raises
     ------
     ValueError
-        `hysteresis_k` is negative or not finite.
+        `hysteresis_k` is negative or not finite, or there is no such `action`.
     """
 
     hysteresis_k: float = 0.5
+    action: Literal["heat", "cool"] = "heat"
 
     name: ClassVar[str] = "on-off"
 
     def __post_init__(self) -> None:
         if not is_finite_number(self.hysteresis_k) or self.hysteresis_k < 0.0:
             raise ValueError(f"hysteresis_k must be at least 0, got {self.hysteresis_k!r}")
+        if self.action not in ("heat", "cool"):
+            raise ValueError(f"action must be 'heat' or 'cool', got {self.action!r}")
 
     def start(self) -> bool:
         """Return that it is off."""
@@ -54,7 +59,7 @@ class OnOff:
         if not math.isfinite(below_k):
             return belief, math.nan
         if abs(below_k) > 0.5 * self.hysteresis_k:
-            belief = below_k > 0.0
+            belief = (below_k > 0.0) is (self.action == "heat")
         return belief, 1.0 if belief else 0.0
 
     def beliefs(self, belief: bool, situation: Situation) -> Beliefs:

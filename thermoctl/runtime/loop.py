@@ -12,18 +12,15 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 from thermoctl.errors import DriverError, FaultError, LinkError, Refused
-from thermoctl.model.actuator import ActuatorLaw
-from thermoctl.model.sensor import Sensor
 from thermoctl.ports import Clock
-from thermoctl.quantities import is_finite_number
-from thermoctl.regulator import Regulator
 from thermoctl.regulator.limits import command_lasts_s
 from thermoctl.runtime.asked import Asked
 from thermoctl.runtime.connection import Connection
+from thermoctl.runtime.wiring import Output, Wiring, signed
 from thermoctl.signals import Cycle, Event, Measurement, Quality, RawSample, Request, Step
 
 EXCHANGE_S = 0.2
@@ -35,20 +32,6 @@ FRESH_S = 3.0
 _EVENTS = 256
 
 Publish = Callable[[Cycle], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Wiring:
-    """One loop and what it is connected to."""
-
-    name: str
-    regulator: Regulator
-    sensor_board: Connection
-    input: str
-    sensor: Sensor
-    actuator_board: Connection
-    output: str
-    law: ActuatorLaw
 
 
 class Loop:
@@ -78,9 +61,7 @@ class Loop:
         completed: Callable[[], None] = lambda: None,
     ) -> None:
         self.wirings = tuple(wirings)
-        self.boards = tuple(
-            {id(b): b for w in self.wirings for b in (w.sensor_board, w.actuator_board)}.values()
-        )
+        self.boards = tuple({id(b): b for w in self.wirings for b in w.boards}.values())
         self._clock, self._period_s = clock, period_s
         self._publish, self._completed = publish, completed
         self._requests: queue.SimpleQueue[Asked] = queue.SimpleQueue()
@@ -215,18 +196,18 @@ class Loop:
 
     def _write(self, steps: Mapping[str, Step]) -> dict[str, float]:
         """Give every board its drives in one exchange; return the accepted power by loop."""
-        accepted = dict.fromkeys(steps, math.nan)
+        taken: dict[tuple[str, Output], float] = {}
         for board in self.boards:
-            wired = [each for each in self.wirings if each.actuator_board is board]
+            wired = [(w, output) for w in self.wirings for output in w.on(board)]
             if not wired or board.board is None:
                 continue
             now_s = self._clock.now_s()
-            drives = {w.output: self._drive(w, steps[w.name].command.power) for w in wired}
-            lasts_s = min(steps[w.name].command.valid_until_s - now_s for w in wired)
+            drives = {o.channel: self._drive(w, o, steps[w.name].command.power) for w, o in wired}
+            lasts_s = min(steps[w.name].command.valid_until_s - now_s for w, _ in wired)
             lasts_s = min(lasts_s, command_lasts_s(self._period_s))  # whatever a sample's time says
             try:
-                taken = board.write(drives, lasts_s, now_s + EXCHANGE_S)
-                powers = {w.name: _power(w.law, taken.get(w.output)) for w in wired}
+                answer = board.write(drives, lasts_s, now_s + EXCHANGE_S)
+                powers = {(w.name, o): o.power(answer.get(o.channel)) for w, o in wired}
             except DriverError as error:
                 lost = isinstance(error, LinkError)
                 code, fault = ("board.lost", 13) if lost else ("output.refused", 22)
@@ -235,15 +216,22 @@ class Loop:
                 self._off(board)
                 self._fail(self._users(board), "cycle.failed", error)
             else:
-                accepted |= powers
-                for wiring in wired:
-                    wiring.regulator.applied(powers[wiring.name])
+                taken |= powers
+        return {w.name: self._accepted(w, taken) for w in self.wirings}
+
+    def _accepted(self, wiring: Wiring, taken: Mapping[tuple[str, Output], float]) -> float:
+        """Return the power that a loop's outputs took, after telling its regulator."""
+        shares = [taken[key] for o in wiring.outputs if (key := (wiring.name, o)) in taken]
+        if len(shares) < len(wiring.outputs):
+            return math.nan
+        accepted = signed(shares)
+        wiring.regulator.applied(accepted)
         return accepted
 
-    def _drive(self, wiring: Wiring, power: float) -> float:
+    def _drive(self, wiring: Wiring, output: Output, power: float) -> float:
         """Return the drive for `power`; a law that fails costs its own loop the heat, no other."""
         try:
-            return wiring.law.drive_for(power)
+            return output.law.drive_for(wiring.share(output, power))
         except Exception as error:  # noqa: BLE001 - the other loops on this board go on
             self._fail((wiring,), "cycle.failed", error)
             return 0.0
@@ -270,7 +258,7 @@ class Loop:
 
     def _users(self, board: Connection) -> tuple[Wiring, ...]:
         """Return the loops that depend on `board`."""
-        return tuple(w for w in self.wirings if board in (w.sensor_board, w.actuator_board))
+        return tuple(w for w in self.wirings if board in w.boards)
 
     def _tell(self, board: Connection, code: str, fault: int, text: str) -> None:
         """Send every loop that depends on `board` to SAFE."""
@@ -295,7 +283,7 @@ class Loop:
         return confirmed
 
     def _off(self, board: Connection) -> bool:
-        drives = {w.output: 0.0 for w in self.wirings if w.actuator_board is board}
+        drives = {output.channel: 0.0 for w in self.wirings for output in w.on(board)}
         if drives and board.board is not None:
             try:
                 board.write(drives, EXCHANGE_S, self._clock.now_s() + EXCHANGE_S)
@@ -358,8 +346,3 @@ class Loop:
         now_s = self._clock.now_s()
         taken = [self._events.popleft() for _ in range(len(self._events))]
         return tuple(Event(now_s, name, fields) for name, fields in taken)
-
-
-def _power(law: ActuatorLaw, drive: float | None) -> float:
-    """Return the power of what the hardware took; NaN, and not 0, when it does not say."""
-    return law.power_from(drive) if is_finite_number(drive) else math.nan  # type: ignore[arg-type]

@@ -58,7 +58,12 @@ def file(tmp_path: Path, whole: str) -> Path:
 def test_every_profile_passes_the_check(run, path):
     code, out, _ = run("config", "check", "-c", path)
     assert code == 0
-    assert out.startswith(f"{path}: ok; loops: tank (37.5 °C, off above 60 °C")
+    held = [
+        f"{name} ({loop.setpoint_c:g} °C, off above {loop.trip_above_c:g} °C"
+        for name, loop in load(path).loops.items()
+    ]
+    assert out.startswith(f"{path}: ok; loops: {held[0]}")
+    assert all(each in out for each in held)
     assert out.count("\n") == 1
 
 

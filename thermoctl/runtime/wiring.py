@@ -1,0 +1,87 @@
+"""Loops and what they are connected to, and a signed power on one output or two."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from thermoctl.model.actuator import ActuatorLaw
+from thermoctl.model.sensor import Sensor
+from thermoctl.quantities import is_finite_number
+from thermoctl.regulator import Regulator
+from thermoctl.runtime.connection import Connection
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """A channel of a board, and the law of what hangs on it."""
+
+    board: Connection
+    channel: str
+    law: ActuatorLaw
+
+    def power(self, drive: object) -> float:
+        """Return the power of what the hardware took; NaN, and not 0, when it does not say."""
+        known = is_finite_number(drive)
+        return self.law.power_from(drive) if known else math.nan  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """One loop and what it is connected to.
+
+    Parameters
+    ----------
+    name : str
+        Name of the loop.
+    regulator : Regulator
+        Its regulator.
+    sensor_board, input, sensor : Connection, str, Sensor
+        Where its temperature comes from.
+    actuator_board, output, law : Connection, str, ActuatorLaw
+        Where its power goes to: the heater, or a cooler that is the only actuator.
+    cooler : Output, optional
+        Where negative power goes to.
+    """
+
+    name: str
+    regulator: Regulator
+    sensor_board: Connection
+    input: str
+    sensor: Sensor
+    actuator_board: Connection
+    output: str
+    law: ActuatorLaw
+    cooler: Output | None = None
+    outputs: tuple[Output, ...] = field(init=False, repr=False)
+    """The heater, and the cooler where there is one."""
+
+    def __post_init__(self) -> None:
+        heater = Output(self.actuator_board, self.output, self.law)
+        outputs = (heater,) if self.cooler is None else (heater, self.cooler)
+        object.__setattr__(self, "outputs", outputs)
+
+    @property
+    def boards(self) -> tuple[Connection, ...]:
+        """Every board it depends on."""
+        return (self.sensor_board, *(each.board for each in self.outputs))
+
+    def on(self, board: Connection) -> list[Output]:
+        """Return its outputs on `board`."""
+        return [each for each in self.outputs if each.board is board]
+
+    def share(self, output: Output, power: float) -> float:
+        """Return the part of the signed `power` that `output` gives; never both give one."""
+        return max(-power if output is self.cooler else power, 0.0)
+
+
+def signed(shares: Sequence[float]) -> float:
+    """Return what one output, or heater and cooler, took, as one power.
+
+    NaN when one of them is not known; and when both are on, for no power is meant by that.
+    """
+    heat, *cold = shares
+    if not cold:
+        return heat
+    return math.nan if heat > 0.0 and cold[0] > 0.0 else heat - cold[0]
