@@ -1,17 +1,40 @@
 """One loop, watched: finished steps go in, an `Insight` comes out.
 
-Fed beside the loop, never by its thread: see ``thermoctl/app/insight_watch.py``.
+Fed beside the loop, never by its thread: see ``thermoctl/app/insight_watch.py``. A step costs a
+tenth of a millisecond; a judgement, once a minute of the loop's time, some ten.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 
+from thermoctl.insight.changes import ChangeWatch, Found
+from thermoctl.insight.drifts import Compared
+from thermoctl.insight.faults import TURN_LAGS, TURN_S, Faults
 from thermoctl.insight.gate import GateWatch
+from thermoctl.insight.performance import PerformanceWatch
+from thermoctl.insight.reckoning import Reckoned, Reckoning
+from thermoctl.insight.rest import Rest
 from thermoctl.insight.rows import Known, rows
-from thermoctl.insight.values import Gate, Insight
+from thermoctl.insight.samples import Samples
+from thermoctl.insight.told import change_of, change_of_gain, dilution, jump_at
+from thermoctl.insight.values import Change, Drift, Insight
 from thermoctl.insight.witness import Witness
-from thermoctl.signals import Event, Quality, Step
+from thermoctl.signals import Event, Mode, PlantBelief, Quality, State, Step
+
+CHANGES = 10
+"""So many changes are remembered."""
+SETTLED_LAGS, SETTLED_S = 10.0, 60.0
+"""The plant is taken as known when the loop has been at rest for so long."""
+SURE = 0.15
+"""A gain whose standard deviation is a larger share of it is not known."""
+ROWS_S = 5.0
+"""Time from one set of rows to the next."""
+GAIN_MOVED = 1.1
+"""A gain that has moved by this factor makes the balance begin anew."""
+LAG_MOVED = 1.5
+"""A lag that has moved by this factor makes everything begin anew."""
 
 
 class Insights:
@@ -23,23 +46,30 @@ class Insights:
         Time between two samples.
     heater_w : float, optional
         Rated power of the heater in W; without it nothing is told in watts, joules or litres.
+    power_max : float
+        Most power that is ever given, as a fraction.
 
     Raises
     ------
     ValueError
-        `heater_w` is not positive and finite.
+        A parameter is not positive and finite.
     """
 
-    def __init__(self, period_s: float = 1.0, heater_w: float | None = None) -> None:
-        if heater_w is not None and not 0.0 < heater_w < math.inf:
-            raise ValueError(f"heater_w must be positive and finite, got {heater_w!r}")
-        self._heater_w = heater_w
-        self._witness = Witness(period_s)
-        self._gate_watch = GateWatch()
-        self._gate = Gate.UNKNOWN
-        self._applied = 0.0
-        self._t_s = math.nan
-        self._plant: object = None
+    def __init__(
+        self, period_s: float = 1.0, heater_w: float | None = None, power_max: float = 1.0
+    ) -> None:
+        named = (("period_s", period_s), ("heater_w", heater_w), ("power_max", power_max))
+        for name, value in named:
+            if value is not None and not 0.0 < value < math.inf:
+                raise ValueError(f"{name} must be positive and finite, got {value!r}")
+        self._period_s, self._heater_w = period_s, heater_w
+        self._witness, self._gate, self._rest = Witness(period_s), GateWatch(), Rest()
+        self._performance = PerformanceWatch(period_s, power_max)
+        self._faults = Faults()
+        self._known: _Known | None = None
+        self._changes: deque[Change] = deque(maxlen=CHANGES)
+        self._applied, self._power = 0.0, _Turn()
+        self._rows_due_s = self._jumped_s = -math.inf
         self._now = Insight()
 
     @property
@@ -57,15 +87,209 @@ class Insights:
         accepted_power : float
             What the hardware took, until the next step; NaN when it took nothing.
         """
-        applied, self._applied = self._applied, _taken(accepted_power)
+        applied = self._applied
+        self._applied = accepted_power if math.isfinite(accepted_power) else 0.0
         plant = self._witness.after(step, applied)
-        if plant is None or step.measurement.quality is not Quality.GOOD:
+        if plant is None:
             return ()
-        gate = self._gate_watch.after(step.t_s, plant)
-        gain = Known(plant.gain_k_per_s, plant.gain_sd_k_per_s)
-        self._now = Insight(step.t_s, gate, rows(plant, gain, None, self._heater_w))
-        return ()
+        before = dict(self._faults.active)
+        newest = self._changes[0] if self._changes else None
+        if self._rest.after(step, plant.noise_sd_k):
+            self._moved(step)
+        self._watch(step, plant, applied)
+        self._tell(step, plant)
+        return (*self._news_of_changes(step.t_s, newest), *self._news_of_drifts(step.t_s, before))
+
+    # -- watching --------------------------------------------------------------------------------
+
+    def _moved(self, step: Step) -> None:
+        """Forget what another set point or mode has made worthless."""
+        if self._known is not None:
+            self._known.changes.forget()
+        self._faults.settle_anew()
+        self._power = _Turn()
+        auto = step.mode is Mode.AUTO and step.state is State.RUN
+        why = "collecting: moved a moment ago" if auto else "not in mode auto"
+        self._performance.forget(why)
+
+    def _watch(self, step: Step, plant: PlantBelief, applied: float) -> None:
+        """Show the step to everyone who watches."""
+        good = step.measurement.quality is Quality.GOOD
+        reading_c = step.measurement.temperature_c if good else math.nan
+        known = self._known_after(step, plant)
+        if known is None:
+            return
+        known.samples.take(step.t_s, reading_c, applied, plant.lag_s)
+        if not known.settled:
+            return
+        noise_k = plant.noise_sd_k
+        found = known.changes.after(step.t_s, reading_c, applied, noise_k)
+        if found is not None:
+            self._found(step.t_s, found)
+        if plant.jumped:
+            self._jumped(step.t_s)
+        reckoned = known.reckoning.after(step.t_s, self._rest)
+        if reckoned is not None:
+            self._reckoned(reckoned)
+        if good and self._rest.lasts_s(step.t_s) > 0.0 and not known.changes.busy:
+            self._at_rest(step, plant, reading_c)
+
+    def _known_after(self, step: Step, plant: PlantBelief) -> _Known | None:
+        """Return what is known of the plant, which begins when the loop is first at rest."""
+        known = self._known
+        if known is None or known.outlived(plant.lag_s):
+            self._known = known = _Known(self._period_s, plant)
+        settled_s = max(SETTLED_S, SETTLED_LAGS * plant.lag_s)
+        sure = 0.0 < plant.gain_sd_k_per_s < SURE * abs(plant.gain_k_per_s)
+        if not known.settled and sure and self._rest.lasts_s(step.t_s) >= settled_s:
+            known.settle(plant, self._applied)
+        return known
+
+    def _at_rest(self, step: Step, plant: PlantBelief, reading_c: float) -> None:
+        """Judge what can only be judged at rest."""
+        self._performance.after(
+            step.t_s, reading_c, step.setpoint_c, self._applied, plant.lag_s, plant.noise_sd_k
+        )
+        turn_s = max(TURN_S, TURN_LAGS * plant.lag_s)
+        mean = self._power.after(step.t_s, self._applied, turn_s)
+        if mean is not None:
+            self._faults.turn(step.t_s, mean, plant.noise_sd_k)
+
+    def _found(self, t_s: float, found: Found) -> None:
+        known = self._known
+        assert known is not None
+        self._changes.appendleft(change_of(found, known.gain, self._heater_w))
+        known.reckoning.disturb(t_s)
+        self._power = _Turn()
+        if found.step_k is not None:
+            self._faults.add_cold(dilution(found))
+
+    def _jumped(self, t_s: float) -> None:
+        """Date a jump that nobody can measure, because the loop was moved as well."""
+        known = self._known
+        assert known is not None
+        first = t_s - self._jumped_s > known.lag_s * SETTLED_LAGS
+        self._jumped_s = t_s
+        moving = t_s - self._rest.moved_s < max(SETTLED_S, 2.0 * SETTLED_LAGS * known.lag_s)
+        if first and moving and not known.changes.busy:
+            self._changes.appendleft(jump_at(t_s))
+
+    def _reckoned(self, reckoned: Reckoned) -> None:
+        known = self._known
+        assert known is not None
+        compared = self._faults.reckon(reckoned)
+        if reckoned.moved:
+            known.assayed(reckoned, self._applied)
+        if compared is not None:
+            self._changes.appendleft(self._gain_changed(reckoned, compared))
+
+    def _gain_changed(self, reckoned: Reckoned, compared: Compared) -> Change:
+        return change_of_gain(reckoned.began_s, compared, at_rest=not reckoned.moved)
+
+    # -- telling ---------------------------------------------------------------------------------
+
+    def _tell(self, step: Step, plant: PlantBelief) -> None:
+        if step.measurement.quality is not Quality.GOOD:
+            return
+        known, told = self._known, self._now.rows
+        if step.t_s >= self._rows_due_s:
+            self._rows_due_s = step.t_s + ROWS_S
+            gain = Known(plant.gain_k_per_s, plant.gain_sd_k_per_s)
+            sure = known is not None and known.settled
+            told = rows(
+                plant,
+                known.gain if known is not None and sure else gain,
+                known.slope if known is not None else None,
+                self._heater_w,
+            )
+        self._now = Insight(
+            step.t_s,
+            self._gate.after(step.t_s, plant),
+            told,
+            tuple(self._changes),
+            tuple(self._faults.active.values()),
+            self._performance.now,
+        )
+
+    def _news_of_changes(self, t_s: float, newest: Change | None) -> list[Event]:
+        """Return the events of changes since `newest`, oldest first."""
+        news = []
+        for change in self._changes:
+            if change is newest:
+                break
+            fields = {
+                "kind": change.kind,
+                "size": change.size,
+                "unit": change.unit,
+                "text": change.text,
+                "began_s_ago": round(t_s - change.t_s, 1),
+            }
+            news.append(Event(t_s, "plant.changed", fields))
+        return news[::-1]
+
+    def _news_of_drifts(self, t_s: float, before: dict[str, Drift]) -> list[Event]:
+        active = self._faults.active
+        begun = [each for name, each in active.items() if name not in before]
+        ended = [each for name, each in before.items() if name not in active]
+        return [_drifted(t_s, each, True) for each in begun] + [
+            _drifted(t_s, each, False) for each in ended
+        ]
 
 
-def _taken(power: float) -> float:
-    return power if math.isfinite(power) else 0.0
+def _drifted(t_s: float, drift: Drift, active: bool) -> Event:
+    fields = {"drift": drift.name, "active": active, "text": drift.text}
+    return Event(t_s, "plant.drift", fields)
+
+
+class _Turn:
+    """The mean power of a turn at rest."""
+
+    def __init__(self) -> None:
+        self._begin_s, self._sum, self._count = math.nan, 0.0, 0
+
+    def after(self, t_s: float, power: float, turn_s: float) -> float | None:
+        """Take a power; return the mean of the turn that it ends."""
+        if math.isnan(self._begin_s):
+            self._begin_s = t_s
+        self._sum += power
+        self._count += 1
+        if t_s - self._begin_s < turn_s:
+            return None
+        mean = self._sum / self._count
+        self._begin_s, self._sum, self._count = t_s, 0.0, 0
+        return mean
+
+
+class _Known:
+    """A plant that can be watched: its lag and gain, and who watches with them."""
+
+    def __init__(self, period_s: float, plant: PlantBelief) -> None:
+        self._period_s, self.lag_s = period_s, plant.lag_s
+        self.gain = Known(plant.gain_k_per_s, plant.gain_sd_k_per_s)
+        self.slope: Known | None = None
+        self.samples = Samples(period_s)
+        self.settled = False
+
+    def outlived(self, lag_s: float) -> bool:
+        """Return whether the plant has another lag by now."""
+        if not self.settled:
+            return False
+        return not self.lag_s / LAG_MOVED <= lag_s <= self.lag_s * LAG_MOVED
+
+    def settle(self, plant: PlantBelief, power: float) -> None:
+        """Begin to watch with what is believed now."""
+        self.settled = True
+        self.lag_s = plant.lag_s
+        self.gain = Known(plant.gain_k_per_s, plant.gain_sd_k_per_s)
+        self.reckoning = Reckoning(self.lag_s, self.gain.value, self.samples)
+        self._watch_changes(power)
+
+    def _watch_changes(self, power: float) -> None:
+        self.changes = ChangeWatch(self._period_s, self.lag_s, self.gain.value, power)
+
+    def assayed(self, reckoned: Reckoned, power: float) -> None:
+        """Take over a gain that was assayed on a move."""
+        self.gain = reckoned.assay.gain
+        self.slope = reckoned.assay.slope or self.slope
+        if not 1.0 / GAIN_MOVED <= self.gain.value / self.changes.gain_k_per_s <= GAIN_MOVED:
+            self._watch_changes(power)

@@ -1,0 +1,202 @@
+"""A loop against the steadiest that its delay allows, and why it is not.
+
+Explained in ``docs/insight.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from thermoctl.insight.harris import Harris, autocorrelation, harris
+from thermoctl.insight.lagging import DEAD
+from thermoctl.insight.values import Limit, Performance
+from thermoctl.insight.wording import plain
+from thermoctl.quantities import Array
+
+SHORTEST_S, SHORTEST_LAGS = 1_800.0, 100.0
+"""A stretch is judged that is so long, and at least so many lags."""
+LONGEST = 3_600
+"""Samples that are judged at most: the newest ones."""
+FEWEST = 600
+"""And at least."""
+TURN_S = 60.0
+"""Time from one judgement to the next."""
+AT_BOUND = 0.05
+"""A power that is at a bound for a larger share of the time is limited."""
+STEPS = 1.5
+"""A deviation below so many steps of the sensor is made of them."""
+NOISY = 0.5
+"""Noise that is a larger share of the variance than this is what limits."""
+CLOSE = 1.25
+"""A deviation of so many times the bound is close to it."""
+SWING = 0.5
+"""A loop whose error is so alike after a turn, and so unlike after half of one, swings."""
+
+
+def delay_samples(lag_s: float, period_s: float) -> int:
+    """Return d: whole periods of the dead time, and the one in which a power is held."""
+    return math.floor(DEAD * lag_s / period_s) + 1
+
+
+class PerformanceWatch:
+    """Collects control errors, and judges them once a minute.
+
+    Parameters
+    ----------
+    period_s : float
+        Time between two samples.
+    power_max : float
+        Most power that is given.
+    """
+
+    def __init__(self, period_s: float, power_max: float = 1.0) -> None:
+        self._period_s, self._power_max = period_s, power_max
+        self._error: deque[float] = deque(maxlen=LONGEST)
+        self._reading: deque[float] = deque(maxlen=LONGEST)
+        self._bound: deque[bool] = deque(maxlen=LONGEST)
+        self._due_s = -math.inf
+        self.now = Performance("collecting: not at rest in mode auto yet")
+
+    def forget(self, why: str) -> None:
+        """Begin anew, for a reason that the verdict tells."""
+        for each in (self._error, self._reading, self._bound):
+            each.clear()
+        self.now = Performance(why)
+        self._due_s = -math.inf
+
+    def after(
+        self, t_s: float, reading_c: float, setpoint_c: float, power: float, lag_s: float, sd: float
+    ) -> Performance:
+        """Take a sample of a loop at rest; return the judgement, which may be a minute old.
+
+        Parameters
+        ----------
+        t_s : float
+            Its time.
+        reading_c, setpoint_c : float
+            What is read and what is wanted.
+        power : float
+            What is given now.
+        lag_s : float
+            Total lag of the plant.
+        sd : float
+            Standard deviation of a reading, in K.
+        """
+        self._error.append(reading_c - setpoint_c)
+        self._reading.append(reading_c)
+        self._bound.append(power <= 1e-3 or power >= self._power_max - 1e-3)
+        if t_s >= self._due_s:
+            self._due_s = t_s + TURN_S
+            self.now = self._judged(lag_s, sd)
+        return self.now
+
+    def _needed(self, lag_s: float) -> int:
+        span = max(SHORTEST_S, SHORTEST_LAGS * lag_s) / self._period_s
+        return min(LONGEST, max(FEWEST, math.ceil(span)))
+
+    def _judged(self, lag_s: float, noise_sd_k: float) -> Performance:
+        needed, count = self._needed(lag_s), len(self._error)
+        if count < needed:
+            share = plain(100.0 * count / needed)
+            return Performance(f"collecting: {share} % of what is needed")
+        error = np.array(self._error)
+        found = harris(error, delay_samples(lag_s, self._period_s))
+        if found is None:
+            return Performance("the readings do not move: nothing to judge")
+        step_k = smallest_step(np.array(self._reading))
+        limited = float(np.mean(self._bound)) > AT_BOUND
+        limit, why = reason(error, found, self._period_s, lag_s, noise_sd_k, step_k, limited)
+        return Performance(
+            why,
+            limit,
+            found.index,
+            2.0 * found.index_sd,
+            found.deviation_k,
+            found.bound_k,
+            found.ratio,
+        )
+
+
+def smallest_step(reading: Array) -> float:
+    """Return the least difference of two readings that differ, in K; 0 where none do."""
+    values = np.unique(np.round(reading, 9))
+    return float(np.diff(values).min()) if len(values) > 1 else 0.0
+
+
+def reason(
+    error: Array,
+    found: Harris,
+    period_s: float,
+    lag_s: float,
+    noise_sd_k: float,
+    step_k: float,
+    limited: bool,
+) -> tuple[Limit, str]:
+    """Return what keeps a loop from being steadier, and the sentence that says so.
+
+    Parameters
+    ----------
+    error : ndarray, shape (N,)
+        Control errors in K.
+    found : Harris
+        Their index.
+    period_s, lag_s : float
+        Time between two samples, total lag of the plant.
+    noise_sd_k, step_k : float
+        Standard deviation of a reading, and the sensor's smallest step.
+    limited : bool
+        Whether the power was at a bound for more than `AT_BOUND` of the time.
+    """
+    deviation_k, ratio = found.deviation_k, f"{plain(found.ratio, 2)} times the bound"
+    if limited:
+        return Limit.POWER, f"{ratio}: the power is at its limit, no law could give more"
+    if deviation_k < STEPS * step_k:
+        return Limit.STEP, f"{ratio}: the sensor's step of {plain(1e3 * step_k)} mK limits you"
+    turn = cycle_s(error, period_s, lag_s)
+    if turn is not None and found.ratio > CLOSE:
+        return Limit.CYCLE, f"{ratio}: a cycle of {plain(turn)} s, the loop swings"
+    if noise_sd_k**2 > NOISY * deviation_k**2:
+        return Limit.NOISE, f"{ratio}: noise of {plain(1e3 * noise_sd_k)} mK a reading limits you"
+    if found.ratio < CLOSE:
+        return Limit.NONE, f"{ratio}: close to what this delay allows"
+    if sluggish(error, period_s, lag_s):
+        return (
+            Limit.LAG,
+            f"{ratio}: disturbances stay for long, the law could be brisker (less calmness)",
+        )
+    return Limit.LAG, f"{ratio}: the lag limits you; calmness trades travel for deviation"
+
+
+def cycle_s(error: Array, period_s: float, lag_s: float) -> float | None:
+    """Return the period of a cycle in s, None where the loop does not swing.
+
+    The autocorrelation of a cycle is as negative after half a turn as it is positive after a whole
+    one; that of a filtered noise has died down by then.
+    """
+    reach = min(len(error) // 4, math.ceil(20.0 * lag_s / period_s))
+    e = error - error.mean()
+    if reach < 4 or not float(e @ e) > 0.0:
+        return None
+    r = autocorrelation(e, reach)
+    below = np.flatnonzero(r < 0.0)
+    if not len(below):
+        return None
+    trough = int(below[0])
+    back = np.flatnonzero(r[trough:] > 0.0)
+    if not len(back):
+        return None
+    half = trough + int(np.argmin(r[trough : trough + int(back[0])]))
+    peak = trough + int(back[0]) + int(np.argmax(r[trough + int(back[0]) :]))
+    if r[half] < -SWING and r[peak] > SWING:
+        return peak * period_s
+    return None
+
+
+def sluggish(error: Array, period_s: float, lag_s: float) -> bool:
+    """Return whether errors stay on one side for longer than two lags, as one that leans does."""
+    e = error - error.mean()
+    reach = min(len(e) // 4, math.ceil(2.0 * lag_s / period_s))
+    return bool(reach > 0 and np.all(autocorrelation(e, reach) > 0.3))

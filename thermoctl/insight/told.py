@@ -1,0 +1,109 @@
+"""What a change amounts to, in words: kelvin, heat, water, ice, watts."""
+
+from __future__ import annotations
+
+from thermoctl.insight import physics
+from thermoctl.insight.changes import Found
+from thermoctl.insight.drifts import Compared
+from thermoctl.insight.rows import Known
+from thermoctl.insight.values import Change
+from thermoctl.insight.wording import number, plain
+
+_SIGMAS = 2.0
+
+
+def change_of(found: Found, gain: Known, heater_w: float | None) -> Change:
+    """Return a change of the balance as it is told.
+
+    Parameters
+    ----------
+    found : Found
+        What was found.
+    gain : Known
+        Heating rate at full power in K/s.
+    heater_w : float or None
+        Rated power of the heater in W.
+    """
+    capacity = None if heater_w is None else physics.capacity_j_per_k(heater_w, gain.value)
+    if found.step_k is not None and found.step_sd_k is not None:
+        return _step(found, Known(found.step_k, found.step_sd_k), capacity)
+    slope = Known(found.slope_k_per_s or 0.0, found.slope_sd_k_per_s or 0.0)
+    return _slope(found.t_s, slope, capacity)
+
+
+def _step(found: Found, step: Known, capacity: float | None) -> Change:
+    fell = step.value < 0.0
+    size = Known(abs(step.value), step.sd)
+    words = f"step {'loss' if fell else 'gain'} of {number(size.value, size.sd)} K"
+    heat_j = None
+    if capacity is not None:
+        heat_j = capacity * step.value
+        words += f", {plain(abs(heat_j) / 1e3)} kJ"
+    if fell:
+        words += _equivalent(size.value, found.before_c, capacity)
+    kind = "step.loss" if fell else "step.gain"
+    return Change(found.t_s, kind, step.value, _SIGMAS * step.sd, "K", words, heat_j)
+
+
+def _equivalent(fall_k: float, before_c: float, capacity: float | None) -> str:
+    """Return how much cold water, or ice, a fall amounts to."""
+    if capacity is None:
+        return ""
+    cold = physics.cold_water_kg(capacity, fall_k, before_c)
+    ice = physics.ice_kg(capacity, fall_k, before_c)
+    each = [
+        f"{plain(kg, 1 if kg >= 1.0 else 2)} kg of {what}"
+        for kg, what in ((cold, f"water of {plain(physics.COLD_C)} °C"), (ice, "ice"))
+        if kg is not None
+    ]
+    return f", about {' or '.join(each)}" if each else ""
+
+
+def _slope(t_s: float, slope: Known, capacity: float | None) -> Change:
+    up = slope.value < 0.0
+    per_min = slope.scaled(60.0)
+    size = number(abs(per_min.value), per_min.sd)
+    words = f"loss {'up' if up else 'down'} by {size} K/min"
+    if capacity is not None:
+        words += f", {plain(abs(slope.value) * capacity)} W"
+    kind = "loss.up" if up else "loss.down"
+    return Change(t_s, kind, per_min.value, _SIGMAS * per_min.sd, "K/min", words)
+
+
+def change_of_gain(t_s: float, compared: Compared, *, at_rest: bool) -> Change:
+    """Return a change of the gain as it is told.
+
+    Parameters
+    ----------
+    t_s : float
+        When the stretch began in which it was first seen.
+    compared : Compared
+        The gain before and now.
+    at_rest : bool
+        It was seen at rest, and so is known less well.
+    """
+    share = 100.0 * compared.share
+    sd = 100.0 * abs(compared.now.value / compared.before.value) * _relative_sd(compared)
+    way = "up" if share > 0.0 else "down"
+    words = f"gain {way} by {number(abs(share), sd)} %"
+    if at_rest:
+        words += ", seen at rest"
+    return Change(t_s, f"gain.{way}", share, _SIGMAS * sd, "%", words)
+
+
+def _relative_sd(compared: Compared) -> float:
+    before, now = compared.before, compared.now
+    return float(((before.sd / before.value) ** 2 + (now.sd / now.value) ** 2) ** 0.5)
+
+
+def dilution(found: Found) -> float:
+    """Return how much water a step would be, as a share of what was there; 0 where it rose."""
+    fall_k = -(found.step_k or 0.0)
+    left_k = found.before_c - fall_k - physics.COLD_C
+    return fall_k / left_k if fall_k > 0.0 and left_k > 0.0 else 0.0
+
+
+def jump_at(t_s: float) -> Change:
+    """Return a jump of the water that nobody could measure."""
+    words = "the water jumped, by how much cannot be told while the loop moves"
+    return Change(t_s, "jump", None, None, "K", words)
