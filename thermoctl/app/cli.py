@@ -37,6 +37,7 @@ _COMMANDS: Final = {
     "doctor": "thermoctl.app.board_commands:doctor",
     "simulate": "thermoctl.app.board_commands:simulate",
     "tune": "thermoctl.app.tune_command:tune_command",
+    "forget": "thermoctl.app.forget_command:forget",
     "replay": "thermoctl.app.study_commands:replay_command",
     "reproduce": "thermoctl.app.reproduce_commands:reproduce",
     "compare": "thermoctl.app.compare_command:compare",

@@ -1,7 +1,8 @@
 """Where ``thermoctl tune`` meets a board, or the simulated tank in its place.
 
 A real board is taken as the daemon takes it: its locks first, then the latches of earlier runs,
-and a latch of this one is on the disk before the run is over.
+and a latch of this one is on the disk before the run is over. What the loop's controllers have
+learnt of a real plant is stored as the daemon stores it.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from thermoctl.runtime.clock import MonotonicClock, SimulatedClock
 from thermoctl.runtime.loop import Loop, Publish
 from thermoctl.services.events import level_of
 from thermoctl.services.latches import LatchKeeper
+from thermoctl.services.learned import LearnedStore, ModelKeeper
 from thermoctl.services.places import make_private, runtime_dir
 from thermoctl.services.store import LatchStore
 from thermoctl.signals import Cycle
@@ -76,20 +78,27 @@ def run_on_board(
         keeper.start()
         stack.callback(keeper.close)
 
+        last: dict[str, Cycle] = {}
+
         def keep(cycle: Cycle) -> None:
+            last[cycle.loop] = cycle
             for alarm in cycle.step.alarms:
                 if alarm.latched:
                     keeper.latched(cycle.loop, alarm)
 
         clock = MonotonicClock()
         single = alone(settings, name)
-        return _run(
+        ran = _run(
             name,
             excitation,
             clock,
             lambda publish: loop_for(single, clock, publish, beside=False),
             keep,
         )
+        learned = LearnedStore(directory)
+        if ModelKeeper(learned, clock.now_s).store(last, at_end=True):
+            say([f"{learned.path_of(name)} written: the next start begins with what was learnt"])
+        return ran
 
 
 def _run(

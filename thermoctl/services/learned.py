@@ -129,21 +129,23 @@ class ModelKeeper:
         self._store, self._now_s, self._every_s = store, now_s, every_s
         self._last_s = now_s()
 
-    def store(self, cycles: Mapping[str, Cycle], *, at_end: bool = False) -> None:
-        """Store what the last of each loop's `cycles` has learnt, when it is time to.
+    def store(self, cycles: Mapping[str, Cycle], *, at_end: bool = False) -> list[str]:
+        """Store what each loop's last cycle knows, when it is time; return which.
 
         Only of a loop that runs: what a model made of a sensor that fell out is not worth keeping.
         A disk that is full or read-only is tried again the next time.
         """
         now_s = self._now_s()
         if not at_end and now_s - self._last_s < self._every_s:
-            return
-        self._last_s = now_s
+            return []
+        self._last_s, stored = now_s, []
         for loop, cycle in cycles.items():
             models = cycle.step.remember() if cycle.step.state is State.RUN else {}
             if models:
                 with suppress(OSError, ValueError, TypeError):  # a plug-in's may be no JSON at all
                     self._store.save(loop, models)
+                    stored.append(loop)
+        return stored
 
 
 def remembered_models(
