@@ -1,6 +1,6 @@
 """Gains of a PID that outlive a restart, and which of them are believed.
 
-Explained in ``docs/control.md``.
+Explained in ``docs/service.md``.
 """
 
 from __future__ import annotations
