@@ -8,7 +8,7 @@ from rich.text import Text
 
 from thermoctl.app.live import numbers
 from thermoctl.app.live.look import Look, Role, printable
-from thermoctl.app.live.model import View
+from thermoctl.app.live.model import View, told
 from thermoctl.app.live.rows import Part, fitted, parted
 from thermoctl.signals import Alarm, Mode, Quality, State
 
@@ -53,7 +53,6 @@ def _clock(view: View) -> str:
 def _told(view: View, look: Look, width: int) -> Text | None:
     """Return the first row as a banner, when the state asks for one."""
     state = view.step.state if view.step else State.RUN
-    heated = view.accepted_power > 0.0
     words = []
     if state is State.LATCHED:
         words.append("■ LATCHED")
@@ -68,12 +67,19 @@ def _told(view: View, look: Look, width: int) -> Text | None:
     if view.lost:
         words.append("daemon gone · heater not known")
     else:
-        words.append(f"heater {numbers.power(view.accepted_power)}" if heated else "heater off")
+        words.append(_heater(view.accepted_power))
     left = "   ".join(filter(None, (view.facts.loop, _speed(view), " · ".join(words))))
     right = f"{_age(view)}   {_clock(view)}"
     if len(left) + len(right) >= width:
         right = _clock(view)  # since when is said already
     return parted(look, [(left, bar)], [(right, bar)], width, ground=bar)
+
+
+def _heater(power: float) -> str:
+    """Return what the heater does, or the cooler; NaN is nothing that was taken."""
+    if power < 0.0:
+        return f"cooler {numbers.power(-power)}"
+    return f"heater {numbers.power(power)}" if power > 0.0 else "heater off"
 
 
 def state_row(view: View, look: Look, width: int) -> Text:
@@ -170,7 +176,10 @@ def _holding(view: View, room: int) -> list[Part]:
     if view.step is None or view.step.mode is Mode.OFF or holding is None:
         return []
     percent = numbers.number(100.0 * holding, 0)
-    words, value = " · holds with ", numbers.with_unit(percent, "%")
+    row = told(view.insight, "holding_power")
+    error = numbers.number(None if row is None else row.error, 0)
+    sure = percent if error == numbers.UNKNOWN else f"{percent} ± {error}"
+    words, value = " · holds with ", numbers.with_unit(sure, "%")
     if percent == numbers.UNKNOWN or len(words) + len(value) >= room:
         return []
     return [(words, Role.MUTE), (value, Role.BLUE)]

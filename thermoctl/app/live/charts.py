@@ -36,7 +36,7 @@ class Frame:
 
     Parameters
     ----------
-    table : ndarray, shape (12, 2 * cells)
+    table : ndarray, shape (15, 2 * cells)
         The run, a dot column each; rows as in `thermoctl.app.live.trend`.
     left_s, cell_s : float
         Loop time of the left edge, and length of a cell.
@@ -218,18 +218,30 @@ def deviation(chart: Frame, rows: int) -> list[Text]:
 
 
 def power(chart: Frame, rows: int) -> list[Text]:
-    """Return the strip of accepted power: mean as an area, greatest as a dot."""
+    """Return the strip of accepted power: mean as an area, extremes as dots.
+
+    It reaches below zero from the first power on that does.
+    """
     look, dots = chart.look, rows * braille.DOTS_HIGH
     grid = Grid(rows, chart.cells)
+    cools = bool((chart.view.trend.table[trend.POWER_LOW] < 0.0).any())
     count = chart.table[trend.POWER_COUNT]
     mean = chart.table[trend.POWER_SUM] / np.where(count > 0.0, count, np.nan)
-    top = braille.heights(chart.table[trend.POWER_HIGH], 0.0, 1.0, dots)
-    area = braille.envelope(np.zeros_like(mean), braille.heights(mean, 0.0, 1.0, dots), dots)
-    peaks = braille.envelope(top, top, dots)
-    drawn = area | peaks if look.utf8 else area
+
+    def level(values: Array) -> Array:
+        return braille.heights(values, -1.0 if cools else 0.0, 1.0, dots)
+
+    zero, top, bottom = (
+        level(each)
+        for each in (np.zeros(1), chart.table[trend.POWER_HIGH], chart.table[trend.POWER_LOW])
+    )
+    drawn = braille.envelope(np.minimum(zero, level(mean)), np.maximum(zero, level(mean)), dots)
+    if look.utf8:
+        drawn |= braille.envelope(top, top, dots)
+        drawn |= braille.envelope(bottom, bottom, dots) if cools else False
     grid.paint(braille.cells(drawn, utf8=look.utf8, mark="#"), Role.SLATE)
     labels, gutters = [""] * rows, [("", Role.PAGE)] * rows
-    labels[0], labels[-1] = "100 %", "0"
+    labels[0], labels[-1] = "100 %", "−100 %" if cools else "0"
     gutters[0] = ("power", Role.MUTE)
     gutters[-1] = (numbers.power(chart.view.accepted_power), Role.STRONG)
     return [chart.row(labels[row], grid, row, gutters[row]) for row in range(rows)]

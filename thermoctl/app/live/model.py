@@ -12,6 +12,7 @@ import numpy as np
 from thermoctl.app.live.scale import Scale, range_for
 from thermoctl.app.live.sentences import Sentence, sentence
 from thermoctl.app.live.trend import Trend, TrendRecorder
+from thermoctl.insight import Insight, Row
 from thermoctl.quantities import Array
 from thermoctl.signals import Beliefs, Cycle, Event, Mode, Quality, Step
 
@@ -137,7 +138,8 @@ class Recent:
 class View:
     """One moment of a run: all that `thermoctl.app.live.render.render` needs.
 
-    `lost` says why nothing more is heard of the loop; empty while it is.
+    `insight` is what is told of the plant beside its controller, None where nobody looks; `lost`
+    says why nothing more is heard of the loop, and is empty while it is.
     """
 
     facts: Facts
@@ -150,6 +152,7 @@ class View:
     scale: Scale
     recent: Recent
     events: tuple[Sentence, ...]
+    insight: Insight | None = None
     prompt: str = ""
     paused: bool = False
     lost: str = ""
@@ -194,9 +197,28 @@ class View:
         return Beliefs() if self.step is None else self.step.beliefs
 
 
+def told(insight: Insight | None, name: str) -> Row | None:
+    """Return the row `name` of `insight`, None where it has no value."""
+    rows = () if insight is None else insight.rows
+    return next((row for row in rows if row.name == name and row.value is not None), None)
+
+
 def _known(value: float | None) -> float:
     """Return `value`, or NaN when it is none, not finite, or too large to be believed."""
     return value if value is not None and -_LARGEST < value < _LARGEST else _NAN
+
+
+def _believed(beliefs: Beliefs, insight: Insight | None) -> tuple[float, ...]:
+    """Return gain in K/min, pole, holding power, loss in K/min and lag in s; NaN is unknown."""
+    gain, loss, lag = (told(insight, name) for name in ("gain", "loss", "lag"))
+    own = None if beliefs.gain is None else 60.0 * beliefs.gain
+    return (
+        _known(own if gain is None else gain.value),
+        _known(beliefs.a),
+        _known(beliefs.holding_power),
+        _known(None if loss is None else loss.value),
+        _known(beliefs.lag_s if lag is None else lag.value),
+    )
 
 
 def _in_sigma(step: Step) -> float:
@@ -219,6 +241,7 @@ class LiveModel:
     def __init__(self, facts: Facts) -> None:
         self.facts = facts
         self._cycle: Cycle | None = None
+        self._insight: Insight | None = None
         self._last_good_s = _NAN
         self._first_s = _NAN
         self._recorder = TrendRecorder(facts.period_s)
@@ -230,13 +253,13 @@ class LiveModel:
         self._deviations_k: deque[float] = deque(maxlen=DEVIATION_SAMPLES)
         self._events: deque[Sentence] = deque(maxlen=_EVENTS_KEPT)
 
-    def feed(self, cycle: Cycle) -> None:
-        """Take one finished cycle."""
+    def feed(self, cycle: Cycle, insight: Insight | None = None) -> None:
+        """Take one finished cycle, and what is told of the plant after it."""
         step = cycle.step
         if cycle.loop != self.facts.loop:
             return
-        self._cycle = cycle
-        measurement, beliefs = step.measurement, step.beliefs
+        self._cycle, self._insight = cycle, insight
+        measurement = step.measurement
         temperature_c = _NAN
         if measurement.quality is Quality.GOOD:
             temperature_c = _known(measurement.temperature_c)
@@ -255,15 +278,8 @@ class LiveModel:
         self._scale.grow(setpoint_c)
         self._recorder.add(
             step.t_s,
-            (temperature_c, 1e3 * deviation_k),
-            (
-                _known(cycle.accepted_power),
-                _known(step.estimate.inflation),
-                setpoint_c,
-                _known(beliefs.gain),
-                _known(beliefs.a),
-                _known(beliefs.holding_power),
-            ),
+            (temperature_c, 1e3 * deviation_k, _known(cycle.accepted_power)),
+            (_known(step.estimate.inflation), setpoint_c, *_believed(step.beliefs, insight)),
         )
         for event in step.events:
             self.note(event)
@@ -287,6 +303,7 @@ class LiveModel:
             scale=self._scale.copy(),
             recent=self._recent(),
             events=tuple(self._events),
+            insight=self._insight,
             prompt=prompt,
             paused=paused,
             lost=lost,

@@ -48,6 +48,11 @@ def difference(value_k: float | None) -> str:
     return with_unit(number(value_k, decimals, signed=True), "K")
 
 
+def millikelvin(value_k: float | None) -> str:
+    """Return a difference without a sign, such as ``23 mK``."""
+    return with_unit(number(None if value_k is None else 1e3 * abs(value_k), 0), "mK")
+
+
 def power(fraction: float | None) -> str:
     """Return a power such as ``23.1 %``, from a fraction in [0, 1]."""
     return with_unit(number(None if fraction is None else 100.0 * fraction, 1), "%")

@@ -18,6 +18,9 @@ from thermoctl.app.live.sentences import Mark, Sentence
 
 LEAST_WIDTH, LEAST_HEIGHT = 80, 24
 
+_RULE_CELLS = 24
+"""Cells of a rule that its note leaves to the title, and to a little of the rule itself."""
+
 _SPACINGS = ((0, " ", "  "), (0, " ", " "), (1, " ", " "), (2, " ", " "), (2, "", " "))
 """Ways to set the keys, the roomiest first: how short the words are, what stands around them."""
 
@@ -26,19 +29,27 @@ _MARK_ROLES = {Mark.WARNING: Role.AMBER, Mark.ALARM: Role.RED, Mark.CHANGE: Role
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """How many rows the parts that can grow get; everything else takes eleven."""
+    """How many rows the parts that can grow get; everything else takes seven."""
 
     temperature: int = 4
     deviation: int = 4
     power: int = 2
+    beliefs: int = panel.LEAST_ROWS
+    shadow: int = 0
     events: int = 2
 
 
-def _layout(height: int) -> _Layout:
+def _layout(height: int, *, shadow: bool) -> _Layout:
     """Return the layout for `height` rows, at least 24; further rows are dealt out in turn."""
-    turn = "EETDEE" + "TDTDE" * height
+    turn = ("S" if shadow else "E") + "ETDEEBB" + "TDTDE" * height
     extra = turn[: height - LEAST_HEIGHT]
-    return _Layout(4 + extra.count("T"), 4 + extra.count("D"), 2, 2 + extra.count("E"))
+    return _Layout(
+        temperature=4 + extra.count("T"),
+        deviation=4 + extra.count("D"),
+        beliefs=panel.LEAST_ROWS + extra.count("B"),
+        shadow=extra.count("S"),
+        events=2 + extra.count("E"),
+    )
 
 
 def _event_row(view: View, look: Look, event: Sentence, width: int) -> Text:
@@ -93,6 +104,14 @@ def _offered(view: View) -> list[tuple[str, ...]]:
     return [*keys, ("q", "quit")]
 
 
+def _performance(view: View, width: int) -> str:
+    """Return what the rule above the deviation says: the verdict on it, if there is room."""
+    band = f"dotted: ±{charts.DEVIATION_BAND_MK:g} mK"
+    verdict = "" if view.insight is None else numbers.sentence(view.insight.verdict)
+    whole = f"{verdict} · {band}" if verdict else band
+    return whole if len(whole) + _RULE_CELLS <= width else verdict or band
+
+
 def render(view: View, width: int, height: int, look: Look) -> list[Text]:
     """Return `view` as `height` rows of `width` cells each.
 
@@ -108,18 +127,20 @@ def render(view: View, width: int, height: int, look: Look) -> list[Text]:
     if width < LEAST_WIDTH or height < LEAST_HEIGHT:
         rows = [banner.one_line(view, look, width)] if height > 0 else []
         return rows + [fitted(look.text(), width) for _ in range(height - len(rows))]
-    layout, chart = _layout(height), charts.frame(view, look, width)
+    shadow = view.step is not None and view.step.shadow is not None
+    layout, chart = _layout(height, shadow=shadow), charts.frame(view, look, width)
     return [
         banner.state_row(view, look, width),
         banner.values_row(view, look, width),
         ruled(look, "Temperature °C", f"last {numbers.span(view.range_s)}", width),
         *charts.temperature(chart, layout.temperature),
-        ruled(look, "Deviation mK", f"dotted: ±{charts.DEVIATION_BAND_MK:g} mK", width),
+        ruled(look, "Deviation mK", _performance(view, width), width),
         *charts.deviation(chart, layout.deviation),
         *charts.power(chart, layout.power),
         charts.time_axis(chart),
-        ruled(look, "What it believes", panel.note(view, width), width),
-        *panel.beliefs(view, look, width),
+        ruled(look, "What it believes", panel.note(view, width - _RULE_CELLS), width),
+        *panel.beliefs(view, look, width, layout.beliefs),
+        *(panel.shadow(view, look, width) for _ in range(layout.shadow)),
         ruled(look, "Events", "", width),
         *_events(view, look, layout.events, width),
         _keys(view, look, width),

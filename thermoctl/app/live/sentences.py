@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -70,6 +71,8 @@ _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
     "output.nan": (Mark.WARNING, ("No number from {controller}: power 0", "No number: power 0")),
     "output.readback": (Mark.WARNING, ("Output differs: {text}", "Output differs from command")),
     "output.refused": (Mark.WARNING, ("Output refused: {text}", "Output refused")),
+    "plant.changed": (Mark.CHANGE, ("{text}", "The plant has changed")),
+    "plant.drift": (Mark.WARNING, ("{text}", "The plant has drifted")),
     "request.refused": (Mark.WARNING, ("Refused: {why}", "Request refused")),
     "sensor.missing": (Mark.WARNING, ("No sample: {text}", "No sample from the sensor")),
     "sensor.open": (Mark.WARNING, ("Sensor open: {text}", "Sensor open")),
@@ -121,10 +124,19 @@ def sentence(event: Event) -> Sentence:
     mark, templates = _SENTENCES.get(event.name, (unlisted, ()))
     if event.name == "state.changed":
         mark = _STATE_MARKS.get(fields.get("after", ""), mark)
+    elif event.name == "plant.drift" and event.fields.get("active") is False:
+        mark, templates = Mark.NONE, ("No longer: {text}", "The plant is as it was")
+    t_s = event.t_s - _dated_back_s(event)
     for template in templates:
         try:
             words = template.format_map(fields)
-            return Sentence(event.t_s, event.name, words[:1].upper() + words[1:], mark)
+            return Sentence(t_s, event.name, words[:1].upper() + words[1:], mark)
         except KeyError:
             continue
-    return Sentence(event.t_s, event.name, _described(event, fields), mark)
+    return Sentence(t_s, event.name, _described(event, fields), mark)
+
+
+def _dated_back_s(event: Event) -> float:
+    """Return how long before it was noticed the change began, in s."""
+    ago = event.fields.get("began_s_ago", 0.0)
+    return float(ago) if isinstance(ago, int | float) and 0.0 < ago < math.inf else 0.0

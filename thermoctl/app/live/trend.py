@@ -21,6 +21,7 @@ CAPACITY = 4096
 (
     TEMPERATURE_LOW,
     DEVIATION_LOW,
+    POWER_LOW,
     TEMPERATURE_HIGH,
     DEVIATION_HIGH,
     POWER_HIGH,
@@ -31,9 +32,11 @@ CAPACITY = 4096
     GAIN,
     POLE,
     HOLDING,
-) = range(12)
-_LOWS, _HIGHS, _SUMS, _LASTS = slice(0, 2), slice(2, 6), slice(6, 8), slice(8, 12)
-_EMPTY = (math.nan,) * 6 + (0.0, 0.0) + (math.nan,) * 4
+    LOSS,
+    LAG,
+) = range(15)
+_LOWS, _HIGHS, _SUMS, _LASTS = slice(0, 3), slice(3, 7), slice(7, 9), slice(9, 15)
+_EMPTY = (math.nan,) * 7 + (0.0, 0.0) + (math.nan,) * 6
 
 
 def _merge(table: Array, starts: npt.NDArray[np.intp]) -> Array:
@@ -57,7 +60,7 @@ class Trend:
         Loop time of the left edge of the first bucket; NaN before the first sample.
     width_s : float
         Length of a bucket.
-    table : ndarray, shape (12, buckets)
+    table : ndarray, shape (15, buckets)
         The rows are named by this module's constants; NaN where there was no sample.
     """
 
@@ -78,7 +81,7 @@ class Trend:
 
         Returns
         -------
-        ndarray, shape (12, count)
+        ndarray, shape (15, count)
             Each column reduces every bucket it touches.
         """
         result = np.tile(np.array(_EMPTY)[:, None], (1, count))
@@ -113,17 +116,20 @@ class TrendRecorder:
         self._open = list(_EMPTY)
         self._at = 0
 
-    def add(self, t_s: float, pair: tuple[float, float], rest: tuple[float, ...]) -> None:
+    def add(
+        self, t_s: float, extremes: tuple[float, float, float], rest: tuple[float, ...]
+    ) -> None:
         """Take one sample.
 
         Parameters
         ----------
         t_s : float
             Loop time; a sample older than the open bucket is not taken.
-        pair : tuple of 2 floats
-            Temperature in °C and deviation in mK, of which both extremes are kept.
-        rest : tuple of 6 floats
-            Power, inflation, set point, gain, pole, holding power. NaN is unknown, everywhere.
+        extremes : tuple of 3 floats
+            Temperature in °C, deviation in mK and power, of which both extremes are kept.
+        rest : tuple of 7 floats
+            Inflation, of which the greatest is kept; set point, gain, pole, holding power, loss and
+            lag, of which the last is. NaN is unknown, everywhere.
         """
         if not math.isfinite(t_s):
             return
@@ -139,27 +145,25 @@ class TrendRecorder:
         if at != self._at:
             self._table[:, self._at] = self._open
             self._open, self._at = list(_EMPTY), at
-        self._extend(pair, rest)
+        self._extend(extremes, rest)
 
-    def _extend(self, pair: tuple[float, float], rest: tuple[float, ...]) -> None:
+    def _extend(self, extremes: tuple[float, float, float], rest: tuple[float, ...]) -> None:
         """Widen the open bucket by one sample."""
         row = self._open
-        for i, value in enumerate(pair):
+        for i, value in enumerate(extremes):
             # Comparisons are turned so that a NaN in the bucket is replaced, one coming is not.
             if value == value:
                 if not row[i] <= value:
                     row[i] = value
                 if not row[TEMPERATURE_HIGH + i] >= value:
                     row[TEMPERATURE_HIGH + i] = value
-        power, inflation = rest[0], rest[1]
+        power, inflation = extremes[2], rest[0]
         if power == power:
             row[POWER_SUM] += power
             row[POWER_COUNT] += 1.0
-            if not row[POWER_HIGH] >= power:
-                row[POWER_HIGH] = power
         if inflation == inflation and not row[INFLATION_HIGH] >= inflation:
             row[INFLATION_HIGH] = inflation
-        row[SETPOINT:] = rest[2:]
+        row[SETPOINT:] = rest[1:]
 
     def _fold(self) -> None:
         """Merge neighbouring buckets."""

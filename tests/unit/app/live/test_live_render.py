@@ -432,15 +432,3 @@ def test_without_colour_no_style_has_a_hue() -> None:
         style = Look(Colour.NONE).style(role)
         assert style.color is None
         assert style.bgcolor is None
-
-
-def test_a_shadow_is_told_of_where_the_row_is_long_enough(
-    model: LiveModel, make_cycle: MakeCycle
-) -> None:
-    cycle = make_cycle(0.0)
-    step = replace(cycle.step, shadow="on-off", shadow_power=0.25)
-    model.feed(replace(cycle, step=step))
-    assert "shadow on-off 25 % · ± is 2σ" in "\n".join(texts(model.view(0.0), 100, 30))
-    assert "shadow" not in "\n".join(texts(model.view(0.0), 80, 24))
-    model.feed(replace(cycle, step=replace(step, shadow_power=None)))
-    assert "shadow on-off – % · ± is 2σ" in "\n".join(texts(model.view(0.0), 100, 30))

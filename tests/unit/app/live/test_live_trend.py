@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from thermoctl.app.live import trend
 from thermoctl.app.live.trend import TrendRecorder
 
-UNKNOWN = (math.nan,) * 6
+UNKNOWN = (math.nan,) * 7
 
 
 def record(recorder: TrendRecorder, t_s: float, temperature_c: float, power: float = 0.0) -> None:
-    recorder.add(t_s, (temperature_c, 0.0), (power, *UNKNOWN[1:]))
+    recorder.add(t_s, (temperature_c, 0.0, power), UNKNOWN)
 
 
 @settings(max_examples=50)
