@@ -192,6 +192,33 @@ class PlantBelief:
 
 
 @dataclass(frozen=True, slots=True)
+class Feasible:
+    """What can be said of the set point before it is reached; NaN where that is not known.
+
+    Reckoned every ten seconds or so, from a balance of heat that is kept beside every controller.
+
+    Parameters
+    ----------
+    holding_power, holding_sd : float
+        Power that holds the set point, as a fraction, and its standard deviation; beyond what there
+        is where the set point is out of reach.
+    highest_c, highest_sd_k : float
+        Temperature that the most power there is can hold, and its standard deviation; the lowest
+        one where power cools.
+    arrival_s, arrival_sd_s : float
+        Time until the plant rests at the set point, with all power there is until the last moment,
+        and its standard deviation; 0 once it is there.
+    """
+
+    holding_power: float = math.nan
+    holding_sd: float = math.nan
+    highest_c: float = math.nan
+    highest_sd_k: float = math.nan
+    arrival_s: float = math.nan
+    arrival_sd_s: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
 class ShadowScore:
     """Two controllers side by side over the last minutes; None where nobody can tell.
 
@@ -310,6 +337,7 @@ class Step:
     shadow: str | None = None
     shadow_power: float | None = None
     shadow_score: ShadowScore | None = None
+    feasible: Feasible = field(default_factory=Feasible)
     tell: Callable[[], PlantBelief | None] = field(default=_nothing, repr=False)
     origin: str | None = None
     remember: Callable[[], Mapping[str, Mapping[str, Any]]] = field(default=_no_models, repr=False)

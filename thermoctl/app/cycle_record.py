@@ -58,6 +58,7 @@ def cycle_record(cycle: Cycle) -> dict[str, Any]:
         "shadow": step.shadow,
         "shadow_power": step.shadow_power,
         "shadow_score": None if step.shadow_score is None else asdict(step.shadow_score),
+        "feasible": {name: finite(value) for name, value in asdict(step.feasible).items()},
         "tick_us": round(cycle.tick_us, 1),
         "late_s": round(cycle.late_s, 6),
         "alarms": [alarm.code for alarm in step.alarms],

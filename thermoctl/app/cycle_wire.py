@@ -22,6 +22,7 @@ from thermoctl.signals import (
     Cycle,
     Estimate,
     Event,
+    Feasible,
     Measurement,
     Mode,
     PlantBelief,
@@ -31,7 +32,7 @@ from thermoctl.signals import (
     Step,
 )
 
-T = TypeVar("T", Alarm, Event, PlantBelief, ShadowScore)
+T = TypeVar("T", Alarm, Event, Feasible, PlantBelief, ShadowScore)
 
 
 def details_of(cycle: Cycle) -> dict[str, Any]:
@@ -87,6 +88,7 @@ def _cycle(record: Mapping[str, Any], details: Mapping[str, Any]) -> Cycle:
         shadow=record["shadow"],
         shadow_power=_maybe(record["shadow_power"]),
         shadow_score=None if score is None else _made(ShadowScore, score),
+        feasible=_made(Feasible, record["feasible"]),
         tell=lambda: believed,
     )
     accepted, tick_us = _number(record["accepted_power"]), _number(record["tick_us"])

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from thermoctl.errors import Refused
 from thermoctl.ports import Remembered, Situation
 from thermoctl.quantities import clamp, is_finite_number
+from thermoctl.regulator.feasible import Feasibility, Wanted
 from thermoctl.regulator.guard import Guard
 from thermoctl.regulator.judge import Verdict
 from thermoctl.regulator.learning import Learning
@@ -71,6 +72,7 @@ class Regulator:
         limits = plan.limits
         self._shadow = Shadow(plan.shadow, limits.power_min, limits.power_max, self._emit)
         self._learning = Learning(plan.identifier, self._supervisor, self._guard)
+        self._feasibility = Feasibility(plan.limits.period_s, self._supervisor.alarms, self._emit)
         self._jump_k = plan.limits.jump_k
         self._t_s: float | None = None
         self._command = Command(0.0, -math.inf, "start")
@@ -149,6 +151,8 @@ class Regulator:
         self._steering.observe(situation)
         beliefs = self._steering.beliefs(situation, self._learning.beliefs(t_s))
         self._jump_k = self._jump_for(beliefs)
+        if self._feasibility.observe(interval_s, applied, temperature_c, beliefs.lag_s):
+            self._feasibility.reckon(self._wanted(), t_s)
         state = self._supervisor.rule(t_s, self._ride_s(situation, beliefs))
         asked, reason = self._ask(situation, state, beliefs)
         self._steering.tell_remarks(t_s)
@@ -209,6 +213,10 @@ class Regulator:
             return self._t_s, self._t_s - before_s
         self._t_s = before_s + period_s  # lost in rounding where a time is absurd, hence:
         return self._t_s, period_s
+
+    def _wanted(self) -> Wanted:
+        wishes = self._wishes
+        return Wanted(wishes.setpoint_c, self._limits.power_max, wishes.mode)
 
     def _jump_for(self, beliefs: Beliefs) -> float:
         """Return how far the next reading may lie off before it is an outlier."""
@@ -275,6 +283,7 @@ class Regulator:
             shadow=self._shadow.name,
             shadow_power=self._shadow.power,
             shadow_score=self._shadow.score,
+            feasible=self._feasibility.known,
             tell=self._steering.tell,
             origin=origin(self._steering.mind),
             remember=remembering((self._steering.mind, self._shadow.mind)),

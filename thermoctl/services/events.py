@@ -61,6 +61,7 @@ _BY_LEVEL: Final = {
         "sensor.missing",
         "sensor.spike",
         "sensor.stale",
+        "setpoint.unreachable",
         "shadow.failed",
         "socket.unavailable",
         "state.ignored",

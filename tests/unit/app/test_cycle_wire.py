@@ -63,6 +63,8 @@ def test_what_is_believed_of_the_plant_arrives(run):
     last = run[-1].step
     assert asdict(sent(run[-1]).step.plant) == asdict(last.plant)
     assert sent(run[-1]).step.shadow_score == last.shadow_score
+    assert sent(run[-1]).step.feasible == last.feasible
+    assert last.feasible.holding_power > 0.1
 
 
 def test_keys_of_a_newer_daemon_are_passed_over(run):

@@ -1,0 +1,330 @@
+r"""How much heat a plant loses at other temperatures than the one it has now.
+
+A balance of heat over stretches of some ten seconds, with what was applied and what was read:
+
+.. math:: \dot T = \beta q - \ell(T), \qquad \ell(T) = d + k\,(T - T_c)
+
+with the gain beta, the loss d at the temperature T_c where the plant is, and its slope k. A Kalman
+filter learns all of them together with T, so that the errors of gain and loss keep their
+correlation: at full power nobody can tell the two apart, while their difference, which says where
+the warming ends, is known well. Mains and draughts wander within minutes; that is counted as noise
+of T with the power density of the wandering, and neighbouring stretches are not taken for more
+than they are worth.
+
+Beyond the temperatures that were seen a loss bends upwards, because water evaporates: the slope
+changes by `BEND` of itself per kelvin, give or take `BEND_SD`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from thermoctl.quantities import Array
+
+T, BETA, D, K = range(4)
+
+START_SD = (0.1, 0.15, 0.01, 1e-3)
+"""Of T in K, beta and d in K/s, k in 1/s: wide, but for a plant that begins near its rest."""
+SIGN_SDS = 1.5
+"""So many standard deviations from 0 the direction of the gain is taken for known."""
+SCALED = 0.2
+"""Once the rate at full power is known to this share, it is the scale of the two to follow:"""
+LOSS_SHARE, WARMS_AT_LEAST_K = 0.3, 10.0
+"""the loss at the start is about 0, give or take this share of the rate, and the slope so steep at
+most that full power warms by so little."""
+WANDER = 0.25
+"""Noise of T in a second, as a share of the gain: mains of 1 % (2 % of power) for a minute."""
+DRIFT_BETA, DRIFT_D, DRIFT_K = 2e-4, 3e-4, 5e-4
+"""Noise of gain and loss in a second, as shares of the gain; of k, as a share of k."""
+VAGUE = 0.3
+"""A gain or slope that is known to no better than this share drifts no further."""
+BEND, BEND_SD = 0.01, 0.015
+"""Change of the slope in a kelvin, as a share of it, and how uncertain that is."""
+WARMS_AT_MOST_K = 500.0
+"""Full power takes no plant farther above its rest; this bounds the slope from below."""
+
+NEARLY_K = 0.1
+"""Water, and what a sensor shows of it, differ by about so much."""
+
+R_FIRST, R_MIN = 4e-4, 1e-6
+"""Variance of a stretch's mean reading in K²."""
+LAG_SHARE = 2.0
+"""Share of that which may come earlier or later than a lag of first order has it."""
+GATE = 9.0
+GATE_STRETCHES = 6
+CHANGED_AFTER, FORGIVEN = 3, 0.25
+"""So many jumps are another plant, and not a litre of cold water; a stretch without any makes up
+for this much of one."""
+
+
+class Known(NamedTuple):
+    """A number with its standard deviation; NaN where nothing is known."""
+
+    mean: float = math.nan
+    sd: float = math.nan
+
+
+class Stretch(NamedTuple):
+    """What happened since the middle of the last stretch.
+
+    Parameters
+    ----------
+    span_s : float
+        Time.
+    heat_s : float
+        Power that reached the sensor, integrated.
+    reading_c : float
+        Mean reading; NaN where there was none.
+    late_s : float
+        Applied power minus that which reached the sensor, integrated without its sign.
+    """
+
+    span_s: float
+    heat_s: float
+    reading_c: float
+    late_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeatBelief:
+    """What is believed of gain and loss; arrays are read-only.
+
+    Parameters
+    ----------
+    x, P : ndarray, shape (4,) and (4, 4)
+        Mean and covariance of T in degC, beta and d in K/s, k in 1/s.
+    centre_c : float
+        Temperature of which d is the loss.
+    stretches : int
+        How many had a reading.
+    R : float
+        Variance of a mean reading in K².
+    before_c : tuple of float
+        The last two mean readings.
+    jumps : float
+        Stretches that ended where the plant could not be, as far as they are not forgiven.
+    scaled : bool
+        Whether the plant's own rate has taken the place of `START_SD`.
+    """
+
+    x: Array
+    P: Array
+    centre_c: float
+    stretches: int = 0
+    R: float = R_FIRST
+    before_c: tuple[float, float] = (math.nan, math.nan)
+    jumps: float = 0.0
+    scaled: bool = False
+    spread: list[list[float]] = field(init=False, repr=False)
+    """P of beta, d and k, for plain reckoning: a number of it is asked a dozen times."""
+
+    def __post_init__(self) -> None:
+        self.x.setflags(write=False)
+        self.P.setflags(write=False)
+        object.__setattr__(self, "spread", self.P[BETA:, BETA:].tolist())
+
+    @property
+    def gain(self) -> float:
+        """Heating rate at full power in K/s; negative where power cools."""
+        return float(self.x[BETA])
+
+    @property
+    def gain_known(self) -> bool:
+        """Whether it is certain that power does something, and in which direction."""
+        return abs(self.gain) > SIGN_SDS * math.sqrt(self.spread[0][0])
+
+    @property
+    def slope(self) -> float:
+        """Slope of the loss in 1/s, at least what `WARMS_AT_MOST_K` allows."""
+        return max(float(self.x[K]), abs(self.gain) / WARMS_AT_MOST_K)
+
+
+def start(reading_c: float) -> HeatBelief:
+    """Return the belief at the first reading."""
+    x, P = np.array([reading_c, 0.0, 0.0, 0.0]), np.diag(np.square(START_SD))
+    return HeatBelief(x, P, reading_c)
+
+
+def after(belief: HeatBelief, stretch: Stretch) -> HeatBelief:
+    """Return the belief after a stretch; without a reading it is carried on."""
+    moved = _predicted(belief, stretch)
+    y = stretch.reading_c
+    if not math.isfinite(y):
+        return replace(moved, before_c=(math.nan, math.nan), jumps=0.0)
+    R = _noise(belief, y)
+    x, P = moved.x, moved.P
+    nu = y - float(x[T])
+    jumps = max(0.0, belief.jumps - FORGIVEN)
+    if moved.stretches >= GATE_STRETCHES and nu * nu > GATE * (float(P[T, T]) + R):
+        jumps = belief.jumps + 1.0
+        P = P.copy()
+        if jumps < CHANGED_AFTER:
+            P[T, T] += nu * nu
+        else:
+            P[BETA:, BETA:] *= 4.0
+    g = P[T] / (float(P[T, T]) + R)
+    x = x + g * nu
+    P = P - np.outer(g, P[T])
+    known = belief.stretches + 1
+    P = 0.5 * (P + P.T)
+    before_c = (y, belief.before_c[0])
+    learnt = HeatBelief(x, P, moved.centre_c, known, R, before_c, jumps, belief.scaled)
+    return learnt if learnt.scaled else _scaled(learnt)
+
+
+def _scaled(belief: HeatBelief) -> HeatBelief:
+    """Return what the rate at full power, once it is known, says of loss and slope.
+
+    Nothing can be known of them before: 50 W in 200 l and 5 kW in 5 l are a factor 4,000 apart.
+    """
+    rate, sd = spare(belief, float(belief.x[T]), 1.0)
+    if sd > SCALED * abs(rate):
+        return belief
+    x, P = belief.x, belief.P
+    for row, scale in ((D, LOSS_SHARE * rate), (K, rate / WARMS_AT_LEAST_K)):
+        g = P[row] / (P[row, row] + scale * scale)
+        x = x - g * x[row]
+        P = P - np.outer(g, P[row])
+    return replace(belief, x=x, P=0.5 * (P + P.T), scaled=True)
+
+
+def _predicted(belief: HeatBelief, stretch: Stretch) -> HeatBelief:
+    """Return the belief one stretch later, before its reading is looked at."""
+    span_s, heat_s, x = stretch.span_s, stretch.heat_s, belief.x
+    T_c, beta, d, k = x.tolist()
+    off_k = T_c - belief.centre_c
+    half_k = 0.5 * (heat_s * beta - span_s * (d + k * off_k))
+    F = np.eye(4)
+    F[T, BETA:] = heat_s, -span_s, -span_s * (off_k + half_k)
+    after_c = float(F[T] @ x)
+    move_k = after_c - belief.centre_c
+    F[D, K] = move_k
+    F[K, K] = 1.0 + max(-0.5, BEND * move_k)
+    P = F @ belief.P @ F.T
+    size, steep = abs(beta), belief.slope
+    late_s = LAG_SHARE * stretch.late_s
+    P[T, T] += size * size * (WANDER * WANDER * span_s + late_s * late_s)
+    if P[BETA, BETA] < (VAGUE * size) ** 2:
+        P[BETA, BETA] += (DRIFT_BETA * size) ** 2 * span_s
+        P[D, D] += (DRIFT_D * size) ** 2 * span_s
+    if P[K, K] < (VAGUE * steep) ** 2:
+        P[K, K] += (DRIFT_K * steep) ** 2 * span_s + (BEND_SD * steep * move_k) ** 2
+    return replace(belief, x=F @ x, P=P, centre_c=after_c)
+
+
+def _noise(belief: HeatBelief, y: float) -> float:
+    """Return the variance of a mean reading, from how the last three bend."""
+    newer, older = belief.before_c
+    bend = y - 2.0 * newer + older
+    if not math.isfinite(bend):
+        return belief.R
+    seen = min(bend * bend / 6.0, 9.0 * belief.R)
+    share = max(0.02, 1.0 / (belief.stretches + 5.0))
+    return max(R_MIN, belief.R + share * (seen - belief.R))
+
+
+# -- what follows ----------------------------------------------------------------------------------
+
+
+def spare(belief: HeatBelief, at_c: float, power: float, *, straight: bool = False) -> Known:
+    """Return how fast `power` would still warm the plant at `at_c`, in K/s.
+
+    With a `straight` loss, that is at least as much as with one that bends.
+    """
+    off_k, steep = at_c - belief.centre_c, belief.slope
+    away_k = at_c - float(belief.x[T])
+    bent = 0.0 if straight else 0.5 * steep * away_k * abs(away_k)
+    mean = power * belief.gain - float(belief.x[D]) - steep * off_k - BEND * max(bent, 0.0)
+    variance = _variance(belief, power, -1.0, -off_k) + (BEND_SD * bent) ** 2
+    return Known(mean, math.sqrt(variance))
+
+
+def holding(belief: HeatBelief, at_c: float) -> Known:
+    """Return the power that holds `at_c`, not limited to what there is."""
+    if not belief.gain_known:
+        return Known()
+    beta = belief.gain
+    power = -spare(belief, at_c, 0.0).mean / beta
+    return Known(power, spare(belief, at_c, power).sd / abs(beta))
+
+
+def reach(belief: HeatBelief, power: float) -> Known:
+    """Return the temperature at which `power` keeps the plant for good, in degC.
+
+    Far away the errors are not symmetric, and the standard deviation is that of the farther side.
+    """
+    if not belief.gain_known:
+        return Known()
+    now_c, steep = float(belief.x[T]), belief.slope
+    rate = spare(belief, now_c, power)
+    rise_k = _bent(rate.mean / steep)
+    there = spare(belief, now_c + rise_k, power)
+    steep_sd = math.sqrt(belief.spread[2][2])
+    flatter = max(steep - steep_sd, abs(belief.gain) / WARMS_AT_MOST_K)
+    sd_k = max(
+        there.sd / (steep * (1.0 + BEND * max(rise_k, 0.0))),
+        abs(_bent(rate.mean / flatter) - rise_k),
+    )
+    return Known(now_c + rise_k, sd_k)
+
+
+def _bent(straight_k: float) -> float:
+    """Return how far it goes where it would be `straight_k` with a loss that does not bend.
+
+    That is the root x of straight - x - BEND x² / 2.
+    """
+    if straight_k <= 0.0:
+        return straight_k
+    return (math.sqrt(1.0 + 2.0 * BEND * straight_k) - 1.0) / BEND
+
+
+def arrival(belief: HeatBelief, from_c: float, to_c: float, power: float, rest: Known) -> Known:
+    """Return when the plant comes to rest at `to_c`, in s from now.
+
+    Parameters
+    ----------
+    belief : HeatBelief
+        What is believed.
+    from_c : float
+        Where the plant would come to rest with holding power from now on.
+    to_c : float
+        Where it shall come to rest.
+    power : float
+        Power until the last moment, holding power from then on.
+    rest : Known
+        How long the heat that is under way then takes to arrive.
+    """
+    way_k = to_c - from_c
+    begin, end = spare(belief, from_c, power), spare(belief, to_c, power)
+    slow = min(begin.mean * way_k, end.mean * way_k)
+    if not (belief.gain_known and slow > 0.0):
+        return Known()
+    falling = math.log(begin.mean / end.mean)
+    steep = (begin.mean - end.mean) / way_k  # of the chord, so that the bend counts
+    straight = abs(falling) < 1e-6
+    time_s = way_k / begin.mean if straight else falling / steep
+    by_rate = -way_k / (begin.mean * end.mean)
+    by_slope = 0.5 * time_s * time_s if straight else (way_k / end.mean - time_s) / steep
+    variance = _variance(
+        belief,
+        by_rate * power,
+        -by_rate,
+        by_slope - by_rate * (from_c - belief.centre_c),
+    )
+    variance += (by_slope * 0.5 * BEND_SD * belief.slope * way_k) ** 2
+    wander_s = WANDER * belief.gain / begin.mean * math.sqrt(time_s)
+    nearly_s = NEARLY_K / end.mean
+    variance += wander_s * wander_s + nearly_s * nearly_s + rest.sd * rest.sd
+    return Known(time_s + rest.mean, math.sqrt(variance))
+
+
+def _variance(belief: HeatBelief, by_beta: float, by_d: float, by_k: float) -> float:
+    """Return the variance of a number with these derivatives."""
+    (bb, bd, bk), (_, dd, dk), (_, _, kk) = belief.spread
+    variance = by_beta * (by_beta * bb + 2.0 * (by_d * bd + by_k * bk))
+    variance += by_d * (by_d * dd + 2.0 * by_k * dk) + by_k * by_k * kk
+    return max(variance, 0.0)

@@ -1,0 +1,245 @@
+"""Whether the set point can be held, with which power, and when it is reached.
+
+A balance of heat is kept beside every controller, in every mode. It needs what was applied and what
+was read, and from the controller no more than its lag. Readings are gathered over stretches of some
+seconds, so that a sample costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from thermoctl.control import heat_loss
+from thermoctl.control.heat_loss import HeatBelief, Known, Stretch
+from thermoctl.quantities import clamp
+from thermoctl.regulator.alarms import AlarmRegister
+from thermoctl.regulator.supervisor import Emit
+from thermoctl.signals import Alarm, Feasible, Mode
+
+STRETCH_S = 10.0
+LAG_GUESS_S = 30.0
+"""Lag of a plant of which the controller says nothing."""
+ARRIVED_K = 0.1
+"""So near the set point counts as there."""
+SURE_SDS, OVER_SDS = 3.0, 1.0
+"""It is unreachable beyond the first, and no longer below the second."""
+SD_MOST_K = 50.0
+POWER_SD_MOST = 0.3
+"""What is known to no better than these is not told."""
+REST_SHARE = 0.8
+"""The last heat comes with the slowest part of the lag."""
+LAG_DOUBT = 0.4
+"""Standard deviation of the time the last heat takes, as a share of it."""
+PATIENCE_S = 864_000.0
+"""What is not reached in ten days at the present rate counts as never reached."""
+FULL = 0.95
+"""Share of the most power that counts as all of it."""
+STEADY = 12
+"""So many stretches in a row must say the same before the alarm comes or goes."""
+
+UNREACHABLE = "setpoint.unreachable"
+_PRIORITY = 2
+
+
+class Gathered(NamedTuple):
+    """Sums over a stretch that is not complete."""
+
+    span_s: float = 0.0
+    heat_s: float = 0.0
+    late_s: float = 0.0
+    total_c: float = 0.0
+    readings: int = 0
+
+    @property
+    def mean_c(self) -> float:
+        """Mean reading; NaN without one."""
+        return self.total_c / self.readings if self.readings else math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is to be held: a set point in degC, with at most `power_max`, in `mode`."""
+
+    setpoint_c: float
+    power_max: float
+    mode: Mode
+
+
+class Feasibility:
+    """Keeps the balance of heat of a loop, and says when its set point is out of reach.
+
+    Parameters
+    ----------
+    period_s : float
+        Nominal time between two samples.
+    alarms : AlarmRegister
+        Where the alarm is raised.
+    emit : callable
+        Called as ``emit(name, **fields)`` when a set point turns out to be out of reach.
+    """
+
+    def __init__(self, period_s: float, alarms: AlarmRegister, emit: Emit) -> None:
+        self._unknown_s = max(60.0, 10.0 * period_s)
+        self._alarms = alarms
+        self._emit = emit
+        self._belief: HeatBelief | None = None
+        self._gathered = Gathered()
+        self._before = Gathered()
+        self._lag_s = LAG_GUESS_S
+        self._heat = 0.0  # power that has reached the sensor
+        self._reading_c = math.nan
+        self._stands, self._contrary = False, 0
+        self.known = Feasible()
+
+    @property
+    def belief(self) -> HeatBelief | None:
+        """What is believed of gain and loss; None before the first stretch."""
+        return self._belief
+
+    def observe(
+        self, interval_s: float, applied: float, reading_c: float, lag_s: float | None
+    ) -> bool:
+        """Gather a sample; return whether it completed a stretch.
+
+        Parameters
+        ----------
+        interval_s : float
+            Time since the last sample.
+        applied : float
+            Power that the plant got meanwhile.
+        reading_c : float
+            Good reading, else NaN.
+        lag_s : float or None
+            Lag from heater to reading, where the controller knows it.
+        """
+        if interval_s > self._unknown_s:
+            self._belief, self._gathered, self._before = None, Gathered(), Gathered()
+            self._heat = 0.0
+            return False
+        if lag_s is not None and lag_s > 0.0:
+            self._lag_s = lag_s
+        warming = max(applied, 0.0)  # a cooler beside the heater has a gain of its own
+        self._heat += -math.expm1(-interval_s / self._lag_s) * (warming - self._heat)
+        heat, seen = self._heat, reading_c == reading_c
+        if seen:
+            self._reading_c = reading_c
+        span_s, heat_s, late_s, total_c, readings = self._gathered
+        self._gathered = Gathered(
+            span_s + interval_s,
+            heat_s + interval_s * heat,
+            late_s + interval_s * (abs(warming - heat) + warming - applied),
+            total_c + reading_c if seen else total_c,
+            readings + seen,
+        )
+        return self._gathered.span_s >= STRETCH_S
+
+    def reckon(self, wanted: Wanted, t_s: float) -> None:
+        """Learn from the stretch that is complete, and say what it means for `wanted`."""
+        now, before = self._gathered, self._before
+        self._before, self._gathered = now, Gathered()
+        reading_c = now.mean_c
+        if self._belief is None:
+            if math.isfinite(reading_c):
+                self._belief = heat_loss.start(reading_c)
+            return
+        belief = heat_loss.after(
+            self._belief,
+            Stretch(
+                0.5 * (before.span_s + now.span_s),
+                0.5 * (before.heat_s + now.heat_s),
+                reading_c,
+                0.5 * (before.late_s + now.late_s),
+            ),
+        )
+        if not math.isfinite(float(belief.x.sum()) + float(belief.P.sum())):
+            self._belief = None
+            return
+        self._belief = belief
+        self.known = self._feasible(belief, wanted)
+        self._tell(belief, wanted, t_s)
+
+    # -- what follows ----------------------------------------------------------------------------
+
+    def _feasible(self, belief: HeatBelief, wanted: Wanted) -> Feasible:
+        """Return what is known well enough to be told."""
+        holding = heat_loss.holding(belief, wanted.setpoint_c)
+        highest = _within(heat_loss.reach(belief, wanted.power_max), SD_MOST_K)
+        arrival = self._arrival(belief, wanted, holding)
+        arrival = _within(arrival, arrival.mean + self._lag_s)
+        return Feasible(*_within(holding, POWER_SD_MOST), *highest, *arrival)
+
+    def _arrival(self, belief: HeatBelief, wanted: Wanted, holding: Known) -> Known:
+        """Return how long it takes with all power there is, and none at the end."""
+        way_k = wanted.setpoint_c - self._reading_c
+        left_k = abs(way_k)
+        if left_k <= ARRIVED_K:
+            return Known(0.0, 0.0)
+        setpoint_c = wanted.setpoint_c - math.copysign(ARRIVED_K, way_k)
+        gain, lag_s = belief.gain, self._lag_s
+        held = clamp(holding.mean, 0.0, wanted.power_max)
+        coasting_c = self._reading_c + gain * lag_s * (self._heat - held)
+        towards = (setpoint_c - coasting_c) * gain > 0.0
+        power = wanted.power_max if towards else 0.0
+        last_k = abs(gain) * lag_s * abs(power - held)
+        if abs(setpoint_c - coasting_c) <= ARRIVED_K:
+            last_k = left_k
+        rest_s = REST_SHARE * lag_s * math.log(max(1.0, last_k / ARRIVED_K))
+        rest = Known(rest_s, LAG_DOUBT * (rest_s + lag_s))
+        if abs(setpoint_c - coasting_c) <= ARRIVED_K:
+            return rest
+        return heat_loss.arrival(belief, coasting_c, setpoint_c, power, rest)
+
+    def _tell(self, belief: HeatBelief, wanted: Wanted, t_s: float) -> None:
+        """Raise the alarm, or clear it; slower to end than to begin."""
+        stood = self._stands
+        full = self._heat >= FULL * wanted.power_max
+        far = _missing_sds(belief, wanted, full) > (OVER_SDS if stood else SURE_SDS)
+        self._contrary = 0 if far is stood else self._contrary + 1
+        if self._contrary >= STEADY or wanted.mode is not Mode.AUTO:
+            self._stands, self._contrary = far and wanted.mode is Mode.AUTO, 0
+        if self._stands:
+            text = _words(self.known, belief, wanted)
+            if self._alarms.set(Alarm(UNREACHABLE, None, _PRIORITY, t_s, text)) and not stood:
+                self._emit(UNREACHABLE, text=text)
+        elif stood:
+            self._alarms.clear(UNREACHABLE)
+
+
+def _within(known: Known, sd_most: float) -> Known:
+    """Return what is known, or nothing where it is too vague to be told."""
+    return known if known.sd <= sd_most else Known()
+
+
+def _missing_sds(belief: HeatBelief, wanted: Wanted, full: bool) -> float:
+    """Return by how many standard deviations the most power does not reach the set point.
+
+    That is the better of two ways to be sure: by the slope that was learnt, and by how slowly the
+    plant still moves, which also tells of one that stands at its limit from the start.
+    """
+    here_c = float(belief.x[heat_loss.T])
+    way_k = wanted.setpoint_c - here_c
+    towards = math.copysign(1.0, way_k)
+    if belief.gain_known and towards * belief.gain < 0.0:
+        return 0.0  # a heater is not asked to cool
+    here = heat_loss.spare(belief, here_c, wanted.power_max)
+    slow = (abs(way_k) / PATIENCE_S - towards * here.mean) / here.sd
+    if not belief.gain_known:
+        return slow if full else 0.0
+    there = heat_loss.spare(belief, wanted.setpoint_c, wanted.power_max, straight=True)
+    return max(slow, -towards * there.mean / there.sd)
+
+
+def _words(known: Feasible, belief: HeatBelief, wanted: Wanted) -> str:
+    """Return what was expected of the set point, and what came."""
+    here_c = float(belief.x[heat_loss.T])
+    side = "most" if wanted.setpoint_c > here_c else "least"
+    which = "full power" if wanted.power_max == 1.0 else f"a power of {wanted.power_max:g}"
+    limit = f"{known.highest_c:.1f} +-{known.highest_sd_k:.1f} degC"
+    if not math.isfinite(known.highest_c):
+        limit = f"about {here_c:.1f} degC"
+    return (
+        f"expected at {side} {limit}, which {which} can hold, "
+        f"got a set point of {wanted.setpoint_c:g} degC"
+    )
