@@ -259,6 +259,9 @@ def _controller(table: LoopTable, chosen: Options, structure: Arx | KnownGain) -
     injected = {name: value for name, value in given.items() if name in known}
     if isinstance(structure, Arx) and table.estimator.guards.enabled and "gain_min_k" in known:
         options.setdefault("gain_min_k", _ARX_GAIN_SHARE * _gain_k(table))
+    told = {"gain_k_per_s": table.model.gain_k_per_s, "power_max": table.power_max}
+    for name in told.keys() & set(known):
+        options.setdefault(name, told[name])
     controller: Controller = plugins.build(law, options, **injected)
     return controller
 

@@ -1,0 +1,265 @@
+r"""How the model is learnt: a Kalman filter on theta with its guards built in.
+
+.. math::
+
+    \theta \leftarrow \theta + K e, \qquad
+    P \leftarrow (I - K\varphi^T) P (I - K\varphi^T)^T + K R K^T + Q, \qquad
+    K = g \circ P\varphi / (\varphi^T P \varphi + R)
+
+The gate g is 1 for the loss, and for everything else as large as the power is excited: at rest
+readings are noise on noise, and would teach a's that oscillate and b's of nothing. In this form,
+Joseph's, P stays a covariance for any K.
+
+Implements section 11 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from thermoctl.control.gpc.model import ChangeModel
+from thermoctl.quantities import Array, clamp
+
+POLE_START = 0.3
+"""First guess of one pole beside the one at 1; a third would begin at 0."""
+POLE_SD, GAIN_SD, LOSS_SD = 0.5, 3.0, 0.1
+"""Of the start: of each a; of b's and loss in shares of the first guess of the gain."""
+POLE_DRIFT, GAIN_DRIFT, LOSS_DRIFT = 3e-3, 3e-3, 6e-4
+"""Noise in a second: of each a; of b's and loss in shares of the gain."""
+POLE_MAX_S = 140.0
+"""The slowest pole beside the one at 1; slower, the two could not be told apart."""
+GAIN_SHARE_MIN = 5e-4
+"""The gain is at least this share of the first guess: 200 l at 50 W, where 8 at 1,500 were guessed.
+A larger one would make such a vessel wait for hours; what matters is that it is above 0."""
+LOSS_MIN, LOSS_MAX = -0.1, 0.95
+"""The loss in shares of the gain: no vessel warms by itself for long, and power can hold it."""
+
+EXCITED_FROM, EXCITED_SPAN = 0.05, 0.05
+"""Powers this far from their running mean teach something, and by so much more everything."""
+EXCITATION_BLOCKS = 20.0
+"""Blocks over which that mean is taken."""
+
+NOISE_START_K, NOISE_MIN_K = 0.01, 0.003
+"""Standard deviation of an innovation: the first guess, and the least that is believed."""
+NOISE_SAMPLES = 200.0
+NOISE_CLIP = 9.0
+"""An innovation counts as no more than three deviations, or a jump would deafen the filter."""
+
+GATE = 25.0
+"""Beyond five deviations the water was moved by something else than power."""
+GATE_BLOCKS = 6
+"""From so many blocks on: before, it is the model that is wrong."""
+SILENT_MORE, LISTENS_MORE = 2, 3
+"""Blocks beyond the memory of the model in which a jump is not learnt from, and how many times as
+long everything is listened to after the jump: a plant that has changed has to be learnt anew."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Learnt:
+    """What is believed of theta; arrays read-only.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (parameters,)
+        The model.
+    P : ndarray, shape (parameters, parameters)
+        Its covariance.
+    noise : float
+        Variance of an innovation in K².
+    mean_power : float
+        Running mean from which excitation is counted.
+    excited : float
+        How much the last sample could teach of a's and b's, in [0, 1].
+    samples : int
+        Samples met so far.
+    since_jump : int
+        Samples since the last jump; large when there was none.
+    """
+
+    theta: Array
+    P: Array
+    noise: float = NOISE_START_K**2
+    mean_power: float = 0.0
+    excited: float = 0.0
+    samples: int = 0
+    since_jump: int = 1_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Learner:
+    """The law of learning.
+
+    Parameters
+    ----------
+    model : ChangeModel
+        What is learnt.
+    gain_k : float
+        First guess of what full power does in a block, in K; positive.
+    size : int
+        Samples in a block; each sample then counts as that share of one.
+    block_s : float
+        Length of a block.
+    """
+
+    model: ChangeModel
+    gain_k: float
+    size: int
+    block_s: float
+    _first: Learnt = field(init=False, repr=False)
+    _cap: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        model, poles = self.model, self.model.n - 1
+        theta, sd = np.zeros(model.parameters), np.empty(model.parameters)
+        theta[: min(poles, 1)] = -POLE_START
+        theta[model.inputs] = self.gain_k * (1.0 + theta[:poles].sum()) / model.m
+        sd[:poles] = POLE_SD
+        sd[model.inputs] = GAIN_SD * self.gain_k / model.m
+        sd[-1] = LOSS_SD * self.gain_k
+        object.__setattr__(self, "_first", Learnt(_frozen(theta), _frozen(np.diag(sd * sd))))
+        object.__setattr__(self, "_cap", _frozen(sd * sd))
+
+    @property
+    def gain_min_k(self) -> float:
+        """Least gain that is believed, in K a block."""
+        return GAIN_SHARE_MIN * self.gain_k
+
+    def start(self) -> Learnt:
+        """Return the belief before the first sample."""
+        return self._first
+
+    def passed(self, belief: Learnt, power: float) -> Learnt:
+        """Return the belief after a block that ended with a gap, of which nothing is learnt."""
+        return self._moved_on(belief, power)
+
+    def update(self, belief: Learnt, change_k: float, phi: Array, power: float) -> Learnt:
+        """Return the belief after a change of the temperature.
+
+        Parameters
+        ----------
+        belief : Learnt
+            The one before.
+        change_k : float
+            Mean of the block that ends now less that of the one before.
+        phi : ndarray, shape (parameters,)
+            What it regresses on.
+        power : float
+            Mean power of the block.
+
+        Raises
+        ------
+        ArithmeticError
+            The result would not be finite; `belief` is still good.
+        """
+        belief = self._moved_on(belief, power)
+        theta, P, noise = belief.theta, belief.P, belief.noise
+        e = change_k - float(phi @ theta)
+        P_phi = P @ phi
+        q = float(phi @ P_phi)
+        span = self.size * (self.model.memory + SILENT_MORE)
+        settled = belief.samples > GATE_BLOCKS * self.size and belief.since_jump >= (
+            span * (1 + LISTENS_MORE)
+        )
+        if settled and e * e > GATE * (q + noise):
+            return replace(belief, since_jump=0, excited=0.0)
+        if belief.since_jump < span:
+            return replace(belief, excited=0.0)
+        excited = self._excitation(phi, belief.mean_power)
+        R = noise * self.size  # neighbouring samples share all but one of their readings
+        K = P_phi / (q + R)
+        K[:-1] *= excited
+        A = -np.multiply.outer(K, phi)
+        A.reshape(-1)[:: len(K) + 1] += 1.0
+        learnt = theta + K * e
+        P = A @ P @ A.T + np.multiply.outer(R * K, K)
+        learnt = self._projected(learnt, P)
+        self._drift(P, learnt, excited)
+        if not math.isfinite(np.vdot(P, P) + learnt @ learnt):
+            raise ArithmeticError(f"expected a finite model after a change of {change_k!r} K")
+        return replace(
+            belief,
+            theta=_frozen(learnt),
+            P=_frozen(P),
+            noise=_followed(noise, e, belief.samples),
+            excited=excited,
+        )
+
+    def _moved_on(self, belief: Learnt, power: float) -> Learnt:
+        mean = belief.mean_power
+        mean += (power - mean) / (EXCITATION_BLOCKS * self.size)
+        since = min(belief.since_jump + 1, 1_000_000)
+        return replace(belief, mean_power=mean, samples=belief.samples + 1, since_jump=since)
+
+    def _excitation(self, phi: Array, mean_power: float) -> float:
+        """Return in [0, 1] how far the powers are from their mean."""
+        farthest = float(np.abs(phi[self.model.inputs] - mean_power).max())
+        return clamp((farthest - EXCITED_FROM) / EXCITED_SPAN, 0.0, 1.0)
+
+    def _drift(self, P: Array, theta: Array, excited: float) -> None:
+        """Let a new P grow by what may change in a sample, up to what it began with; in place.
+
+        Along directions that are not excited nothing would take the growth back again.
+        """
+        model, per_sample_s = self.model, self.block_s / self.size
+        gain_k = model.gain_k(theta)
+        grown = np.empty(model.parameters)
+        grown[: model.n - 1] = POLE_DRIFT**2 * excited
+        grown[model.inputs] = (GAIN_DRIFT * gain_k) ** 2 * excited / model.m
+        grown[-1] = (LOSS_DRIFT * gain_k) ** 2
+        grown *= per_sample_s
+        P += P.T
+        P *= 0.5  # rounding alone would break the symmetry
+        diagonal = P.reshape(-1)[:: model.parameters + 1]
+        diagonal += grown
+        if (diagonal > self._cap).any():
+            d = np.sqrt(self._cap / np.maximum(diagonal, self._cap))
+            P *= np.multiply.outer(d, d)
+
+    def _projected(self, theta: Array, P: Array) -> Array:
+        """Return theta as a heated vessel can have it.
+
+        No b is negative, poles lie inside, and the gain has its sign: without it a law that
+        divides by the gain would heat what is too hot.
+        """
+        model, poles = self.model, self.model.n - 1
+        for j in range(poles, poles + model.m):
+            if theta[j] < 0.0:  # the rest follows by its correlation
+                theta = theta - P[j] * (theta[j] / P[j, j])
+        theta = theta.copy()
+        b = theta[model.inputs]
+        np.maximum(b, 0.0, out=b)
+        slowest = math.exp(-self.block_s / POLE_MAX_S)
+        theta[:poles] = _inside(theta[:poles].tolist(), slowest)
+        least_k = self.gain_min_k * (1.0 + float(theta[:poles].sum()))
+        b += max(least_k - float(b.sum()), 0.0) / model.m
+        full_k = float(b.sum())
+        theta[-1] = clamp(float(theta[-1]), LOSS_MIN * full_k, LOSS_MAX * full_k)
+        return theta
+
+
+def _followed(noise: float, e: float, samples: int) -> float:
+    share = max(1.0 / NOISE_SAMPLES, 1.0 / (samples + 5.0))
+    followed = noise + (min(e * e, NOISE_CLIP * noise) - noise) * share
+    return max(followed, NOISE_MIN_K**2)
+
+
+def _inside(a: list[float], radius: float) -> list[float]:
+    """Return the a's of at most two poles, drawn in until both lie within `radius`."""
+    if not a:
+        return a
+    farthest = abs(a[0])
+    if len(a) == 2:
+        square = a[0] * a[0] - 4.0 * a[1]
+        farthest = 0.5 * (abs(a[0]) + math.sqrt(square)) if square >= 0.0 else math.sqrt(a[1])
+    if farthest <= radius:
+        return a
+    drawn = radius / farthest
+    return [each * drawn ** (i + 1) for i, each in enumerate(a)]
+
+
+def _frozen(values: Array) -> Array:
+    values.setflags(write=False)
+    return values
