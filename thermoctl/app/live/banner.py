@@ -8,9 +8,10 @@ from rich.text import Text
 
 from thermoctl.app.live import numbers
 from thermoctl.app.live.look import Look, Role, printable
-from thermoctl.app.live.model import View, told
+from thermoctl.app.live.model import View
+from thermoctl.app.live.outlook import outlook
 from thermoctl.app.live.rows import Part, fitted, parted
-from thermoctl.signals import Alarm, Mode, Quality, State
+from thermoctl.signals import Alarm, Quality, State
 
 ROOMY = 100
 """Width from which words are written out."""
@@ -166,23 +167,16 @@ def values_row(view: View, look: Look, width: int) -> Text:
     else:
         left += [(numbers.power(view.accepted_power), Role.STRONG)]
     right = _alarms(view, width)
-    left += _holding(view, width - sum(len(string) for string, _ in (*left, *right)))
+    left += _outlook(view, look, width - len(look.text(*left, *right)))
     return parted(look, left, right, width)
 
 
-def _holding(view: View, room: int) -> list[Part]:
-    """Return the power it believes to hold with, if there is room: an alarm comes first."""
-    holding = view.beliefs.holding_power
-    if view.step is None or view.step.mode is Mode.OFF or holding is None:
-        return []
-    percent = numbers.number(100.0 * holding, 0)
-    row = told(view.insight, "holding_power")
-    error = numbers.number(None if row is None else row.error, 0)
-    sure = percent if error == numbers.UNKNOWN else f"{percent} ± {error}"
-    words, value = " · holds with ", numbers.with_unit(sure, "%")
-    if percent == numbers.UNKNOWN or len(words) + len(value) >= room:
-        return []
-    return [(words, Role.MUTE), (value, Role.BLUE)]
+def _outlook(view: View, look: Look, room: int) -> list[Part]:
+    """Return what is to come of the set point, if there is room: an alarm comes first."""
+    for parts in outlook(view):
+        if len(look.text(*parts)) < room:
+            return parts
+    return []
 
 
 def one_line(view: View, look: Look, width: int) -> Text:

@@ -10,7 +10,7 @@ import numpy as np
 
 from thermoctl.app.live import braille, numbers, trend
 from thermoctl.app.live.look import Look, Role
-from thermoctl.app.live.model import FEWEST, View, told
+from thermoctl.app.live.model import FEWEST, View, to_hold, told
 from thermoctl.insight import Row
 from thermoctl.quantities import Array
 
@@ -132,14 +132,14 @@ def gain(bench: Bench) -> Item:
 def holding(bench: Bench) -> Item:
     """Return the power that holds the set point."""
     view = bench.view
-    power, row = view.beliefs.holding_power, told(view.insight, "holding_power")
-    digits = numbers.number(None if power is None else 100.0 * power, 0)
+    power, sd = (math.nan, math.nan) if view.step is None else to_hold(view.step, view.insight)
+    digits = numbers.number(100.0 * power, 0)
     if digits == numbers.UNKNOWN:
         # It was known: the model is there, but too vague at the set point of now.
         before = bool(np.isfinite(view.trend.table[trend.HOLDING]).any())
         reason = "not at this set point" if before else bench.no_belief()
         return _unknown("To hold", "To hold", reason)
-    error = "" if row is None else _error(row.error, 0)
+    error = _error(200.0 * sd, 0)
     spark = bench.spark(trend.HOLDING, 0.05)
     return Item("To hold", "To hold", digits, error, "%", spark, Role.BLUE)
 

@@ -208,14 +208,28 @@ def _known(value: float | None) -> float:
     return value if value is not None and -_LARGEST < value < _LARGEST else _NAN
 
 
-def _believed(beliefs: Beliefs, insight: Insight | None) -> tuple[float, ...]:
+def to_hold(step: Step, insight: Insight | None) -> tuple[float, float]:
+    """Return the power that holds the set point and its standard deviation.
+
+    From the balance of heat where that has come to know it, else from the controller in charge;
+    NaN is unknown.
+    """
+    if math.isfinite(step.feasible.holding_power):
+        return step.feasible.holding_power, step.feasible.holding_sd
+    own, row = step.beliefs.holding_power, told(insight, "holding_power")
+    error = None if row is None else row.error  # twice the standard deviation, in per cent
+    return _NAN if own is None else own, _NAN if error is None else 0.005 * error
+
+
+def _believed(step: Step, insight: Insight | None) -> tuple[float, ...]:
     """Return gain in K/min, pole, holding power, loss in K/min and lag in s; NaN is unknown."""
+    beliefs = step.beliefs
     gain, loss, lag = (told(insight, name) for name in ("gain", "loss", "lag"))
     own = None if beliefs.gain is None else 60.0 * beliefs.gain
     return (
         _known(own if gain is None else gain.value),
         _known(beliefs.a),
-        _known(beliefs.holding_power),
+        _known(to_hold(step, insight)[0]),
         _known(None if loss is None else loss.value),
         _known(beliefs.lag_s if lag is None else lag.value),
     )
@@ -279,7 +293,7 @@ class LiveModel:
         self._recorder.add(
             step.t_s,
             (temperature_c, 1e3 * deviation_k, _known(cycle.accepted_power)),
-            (_known(step.estimate.inflation), setpoint_c, *_believed(step.beliefs, insight)),
+            (_known(step.estimate.inflation), setpoint_c, *_believed(step, insight)),
         )
         for event in step.events:
             self.note(event)

@@ -32,6 +32,12 @@ def with_unit(digits: str, unit: str) -> str:
     return digits if digits == UNKNOWN else f"{digits}{NBSP}{unit}"
 
 
+def plus_minus(value: float, error: float, decimals: int) -> str:
+    """Return `value` ± `error` with the same decimals; without ± where that is not known."""
+    digits, more = number(value, decimals), number(error, decimals)
+    return digits if UNKNOWN in (digits, more) else f"{digits} ± {more}"
+
+
 def temperature(value_c: float | None) -> str:
     """Return a temperature such as ``37.49 °C``."""
     return with_unit(number(value_c, 2), "°C")

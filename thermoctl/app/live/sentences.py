@@ -82,6 +82,10 @@ _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
         ("One bad reading, {temperature_c}, ignored", "One bad reading"),
     ),
     "sensor.stale": (Mark.WARNING, ("Old sample: {text}", "Old sample")),
+    "setpoint.unreachable": (
+        Mark.WARNING,
+        ("Set point out of reach: {text}", "Set point out of reach"),
+    ),
     "setpoint.changed": (Mark.NONE, ("Set point {after_c}, was {before_c}", "Set point changed")),
     "shadow.failed": (
         Mark.WARNING,

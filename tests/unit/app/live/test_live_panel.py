@@ -11,7 +11,7 @@ from thermoctl.app.live.model import LiveModel, View
 from thermoctl.app.live.render import render
 from thermoctl.app.live.score import shadow_words
 from thermoctl.insight import Gate, Insight, Limit, Performance, Row
-from thermoctl.signals import Cycle, Event, ShadowScore
+from thermoctl.signals import Alarm, Cycle, Event, Feasible, Mode, ShadowScore
 
 MakeCycle = Callable[..., Cycle]
 ROWS = (
@@ -163,6 +163,62 @@ numbers = st.floats()
 @given(st.builds(ShadowScore, numbers, numbers, numbers, numbers, numbers, numbers))
 def test_no_score_makes_words_that_hold_no_number(score: ShadowScore) -> None:
     assert not any(bad in words for words in shadow_words(score) for bad in ("nan", "inf"))
+
+
+# -- what is to come of the set point --------------------------------------------------------------
+
+
+def expecting(cycle: Cycle, feasible: Feasible, *alarms: Alarm) -> Cycle:
+    return replace(cycle, step=replace(cycle.step, feasible=feasible, alarms=alarms))
+
+
+HELD = Feasible(0.194, 0.01, 96.0, 5.0, 0.0, 0.0)
+COMING = Feasible(0.38, 0.015, 96.0, 5.0, arrival_s=1500.0, arrival_sd_s=60.0)
+
+
+def test_a_set_point_that_is_held_is_told_with_its_power(
+    model: LiveModel, make_cycle: MakeCycle
+) -> None:
+    view = fed(model, expecting(make_cycle(0.0), HELD), None)
+    for size in ((80, 24), (100, 30)):
+        assert "power 23.1 % · holds with 19 ± 2 %" in spaced(view, *size)[1]
+    assert any(row.startswith("To hold 19 ± 2 %") for row in spaced(view))
+
+
+def test_a_set_point_that_is_far_is_told_with_power_and_arrival(
+    model: LiveModel, make_cycle: MakeCycle
+) -> None:
+    cycle = expecting(make_cycle(0.0, 30.0, setpoint_c=44.0), COMING)
+    view = fed(model, cycle, None)
+    assert "· needs 38 ± 3 % · arrives 14:25 ± 2 min" in spaced(view)[1]
+    assert spaced(view, 80, 24)[1].endswith("power 23.1 % · arrives 14:25 ± 2 min")
+
+
+def test_what_is_known_too_vaguely_is_not_told_at_the_top(
+    model: LiveModel, make_cycle: MakeCycle
+) -> None:
+    vague = Feasible(0.045, 0.227, math.nan, math.nan, 130.0, 21.0)
+    row = spaced(fed(model, expecting(make_cycle(0.0), vague), None))[1]
+    assert "needs" not in row
+    assert "arrives 14:03 ± 1 min" in row
+
+
+def test_a_set_point_out_of_reach_says_what_can_be_held(
+    model: LiveModel, make_cycle: MakeCycle
+) -> None:
+    alarm = Alarm("setpoint.unreachable", None, 2, 0.0, "at most 41.2 +-0.3 degC")
+    most = Feasible(1.3, 0.02, 41.2, 0.25, math.nan, math.nan)
+    view = fed(model, expecting(make_cycle(0.0), most, alarm), None)
+    assert "· out of reach: at most 41.2 ± 0.5 °C" in spaced(view)[1]
+    assert "▲ 1 active" in spaced(view)[1]
+    over = fed(model, expecting(make_cycle(0.0), most, replace(alarm, active=False)), None)
+    assert "out of reach" not in spaced(over)[1]
+
+
+def test_nothing_is_expected_of_a_loop_that_is_off(model: LiveModel, make_cycle: MakeCycle) -> None:
+    row = spaced(fed(model, expecting(make_cycle(0.0, mode=Mode.OFF), COMING), None))[1]
+    assert "arrives" not in row
+    assert "needs" not in row
 
 
 # -- below zero ------------------------------------------------------------------------------------

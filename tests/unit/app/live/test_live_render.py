@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from thermoctl.app.live.look import Colour, Look, Role, segments
 from thermoctl.app.live.model import Facts, LiveModel, View
 from thermoctl.app.live.render import render
+from thermoctl.insight import Gate, Insight, Performance, Row
 from thermoctl.signals import (
     Alarm,
     Beliefs,
@@ -18,6 +19,7 @@ from thermoctl.signals import (
     Cycle,
     Estimate,
     Event,
+    Feasible,
     Measurement,
     Mode,
     Quality,
@@ -27,7 +29,7 @@ from thermoctl.signals import (
 
 MakeCycle = Callable[..., Cycle]
 PLAIN = Look(Colour.NONE)
-SIZES = [(80, 24), (100, 30), (200, 60), (83, 25), (79, 24), (20, 3), (1, 1)]
+SIZES = [(80, 24), (100, 33), (200, 60), (83, 25), (79, 24), (20, 3), (1, 1)]
 LOOKS = [Look(colour, utf8) for colour in Colour for utf8 in (True, False)]
 
 anything = st.floats(allow_nan=True, allow_infinity=True)
@@ -38,7 +40,7 @@ names = st.sampled_from(["loop.started", "change.detected", "trip.over_temperatu
 fields = st.dictionaries(st.sampled_from(["text", "after_c", "why", "late_s"]), anything | words)
 alarms = st.builds(
     Alarm,
-    code=words,
+    code=words | st.just("setpoint.unreachable"),
     fault=st.none(),
     priority=st.integers(1, 3),
     since_s=anything,
@@ -48,7 +50,7 @@ alarms = st.builds(
     acknowledged=st.booleans(),
 )
 cycles = st.builds(
-    lambda value_c, quality, mode, state, setpoint_c, power, theta, believed, rows, said, tick: (
+    lambda value_c, quality, mode, state, set_c, power, theta, believed, rows, said, tick, at: (
         Cycle(
             "tank",
             Step(
@@ -56,13 +58,14 @@ cycles = st.builds(
                 Measurement(0.0, value_c, quality),
                 mode,
                 state,
-                setpoint_c,
+                set_c,
                 Command(0.0, 3.0, "off"),
                 "self-tuning-mv",
                 Estimate(np.ones(theta), np.eye(theta), value_c, power, power),
                 believed,
                 tuple(rows),
                 tuple(said),
+                feasible=at,
             ),
             power,
             tick,
@@ -79,15 +82,35 @@ cycles = st.builds(
     st.lists(alarms, max_size=3),
     st.lists(st.builds(Event, st.floats(-10.0, 1e4) | anything, names, fields), max_size=4),
     anything,
+    st.builds(Feasible, *[likely | anything] * 6),
 )
 
 
-def view_of(run: list[Cycle], interval_s: float, later_s: float, name: str = "tank") -> View:
+row_names = ("gain", "loss", "loss_w", "loss_w_per_k", "holding_power", "lag", "noise", "volume")
+insights = st.none() | st.builds(
+    Insight,
+    anything,
+    st.sampled_from(Gate),
+    st.lists(
+        st.builds(Row, st.sampled_from(row_names), words, maybe, maybe, words, words, maybe, maybe),
+        max_size=4,
+    ).map(tuple),
+    performance=st.builds(Performance, words, ratio=maybe),
+)
+
+
+def view_of(
+    run: list[Cycle],
+    interval_s: float,
+    later_s: float,
+    name: str = "tank",
+    insight: Insight | None = None,
+) -> View:
     facts = Facts(name, 1.0, 5.0, 60.0, datetime(2026, 3, 1, 23, 50), speed=None)
     model = LiveModel(facts)
     for k, cycle in enumerate(run):
         step = replace(cycle.step, t_s=k * interval_s)
-        model.feed(replace(cycle, loop=name, step=step))
+        model.feed(replace(cycle, loop=name, step=step), insight)
     return model.view(max(0, len(run) - 1) * interval_s + later_s)
 
 
@@ -98,11 +121,17 @@ def view_of(run: list[Cycle], interval_s: float, later_s: float, name: str = "ta
     st.sampled_from([0.0, 0.5, 100.0, 1e7]),
     st.sampled_from(LOOKS),
     st.text(min_size=1, max_size=100),
+    insights,
 )
 def test_every_row_fits_whatever_comes(
-    run: list[Cycle], interval_s: float, later_s: float, look: Look, name: str
+    run: list[Cycle],
+    interval_s: float,
+    later_s: float,
+    look: Look,
+    name: str,
+    insight: Insight | None,
 ) -> None:
-    view = view_of(run, interval_s, later_s, name)
+    view = view_of(run, interval_s, later_s, name, insight)
     for width, height in SIZES:
         rows = render(view, width, height, look)
         assert len(rows) == height
