@@ -1,16 +1,20 @@
-"""A ``[loops.NAME.model]`` table made of what a tuning found."""
+"""A ``[loops.NAME]`` table made of what a tuning found: its model, and its limits."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from pydantic import ValidationError
 
+from thermoctl.app.parts import check_parts
+from thermoctl.app.plugins import BadOption
 from thermoctl.app.tables import LoopTable, ModelTable
 from thermoctl.app.toml_text import toml_text
 from thermoctl.studies.orders_words import order_text
 from thermoctl.studies.plant_words import PlantWords
 from thermoctl.studies.tuning import Tuning
+from thermoctl.studies.tuning_limits import InForce, Proposal
 from thermoctl.studies.tuning_words import reference_time_s
 
 _DIGITS = 4
@@ -56,9 +60,47 @@ def _arx_keys(tuning: Tuning, words: PlantWords) -> dict[str, Any]:
     return keys
 
 
-def suggestion_text(loop: str, keys: dict[str, Any], tuning: Tuning) -> str:
+def in_force(table: LoopTable, dead_man_s: float | None) -> InForce:
+    """Return the limits of a loop as they are configured."""
+    explicit = table.model_fields_set
+    return InForce(
+        setpoint_c=table.setpoint_c,
+        highest_setpoint_c=table.setpoint_range_c[1],
+        trip_above_c=table.trip_above_c,
+        power_max=table.power_max,
+        jump_k=table.jump_k if "jump_k" in explicit else None,
+        rise_per_s=table.rise_per_s,
+        dead_man_s=dead_man_s,
+    )
+
+
+def limit_keys(table: LoopTable, limits: Sequence[Proposal]) -> dict[str, Any]:
+    """Return the limits that should be changed, as far as the loop can have them."""
+    keys: dict[str, Any] = {}
+    for limit in limits:
+        if not limit.change or limit.value is None or limit.key not in LoopTable.model_fields:
+            continue
+        try:
+            wanted = table.model_dump(exclude_unset=True) | keys | {limit.key: limit.value}
+            check_parts(LoopTable.model_validate(wanted))
+        except (ValidationError, BadOption):  # such as a trip that its sensor cannot show
+            continue
+        keys[limit.key] = limit.value
+    return keys
+
+
+def suggestion_text(
+    loop: str,
+    table: LoopTable,
+    keys: dict[str, Any],
+    tuning: Tuning,
+    limits: Sequence[Proposal] = (),
+) -> str:
     """Return the keys as TOML, with what else was found as comments."""
-    text = toml_text({"loops": {loop: {"model": keys}}})
+    text = toml_text({"loops": {loop: {**limit_keys(table, limits), "model": keys}}})
+    for limit in limits:
+        if limit.change and limit.key not in LoopTable.model_fields:
+            text += f"# {limit.key} of its board: {limit.value:g}\n"
     words = tuning.words
     if words is not None:
         text += (

@@ -28,6 +28,7 @@ from thermoctl.app.order_options import candidates_option, require_auto
 from thermoctl.app.results import make_folder, print_json, say
 from thermoctl.app.settings import Settings, default_files, load_all
 from thermoctl.app.sim import bench_settings, default_profile, stand_ins
+from thermoctl.app.tables import LoopTable
 from thermoctl.app.trial import Ending, Outcome, plan
 from thermoctl.app.tune_report import Report
 from thermoctl.app.tune_run import Ran, run_on_board, run_simulated
@@ -237,7 +238,15 @@ def _learnt(
         tuning = tune(record, asked.orders, table.setpoint_c)
     except RecordError as problem:
         why = str(problem)
-    return Report(name, table, asked.sim, excitation, outcome, record, tuning, why)
+    dead_man_s = _dead_man_s(settings, table)
+    return Report(name, table, asked.sim, excitation, outcome, record, tuning, why, dead_man_s)
+
+
+def _dead_man_s(settings: Settings, table: LoopTable) -> float | None:
+    """Return the dead-man time of the board that heats, None where it has no such setting."""
+    board = settings.boards.get(getattr(table.actuator, "board", ""))
+    value: object = getattr(board, "dead_man_s", None)
+    return float(value) if isinstance(value, int | float) else None
 
 
 def _tell(report: Report, asked: _Asked) -> None:

@@ -7,11 +7,12 @@ import dataclasses
 import json
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
 from thermoctl.app.results import say
-from thermoctl.app.suggestion import suggested, suggestion_text
+from thermoctl.app.suggestion import in_force, suggested, suggestion_text
 from thermoctl.app.tables import LoopTable
 from thermoctl.app.trial import NAMES, Ending, Outcome
 from thermoctl.errors import Unavailable
@@ -19,7 +20,8 @@ from thermoctl.studies.excitation import Excitation
 from thermoctl.studies.record import Record
 from thermoctl.studies.tuning import Tuning
 from thermoctl.studies.tuning_figure import draw_tuning
-from thermoctl.studies.tuning_words import tuning_json, tuning_lines
+from thermoctl.studies.tuning_limits import Proposal, proposed
+from thermoctl.studies.tuning_words import limit_lines, limits_json, tuning_json, tuning_lines
 from thermoctl.studies.words import duration
 
 RUN: Final = "run.csv"
@@ -30,7 +32,7 @@ FIGURE: Final = "report.png"
 _NOTHING: Final[dict[str, Any]] = {"orders": [], "chosen": None, "model": None, "plant": None}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Report:
     """A run and what it taught.
 
@@ -52,6 +54,8 @@ class Report:
         What they taught.
     why_nothing : str
         Why they taught nothing; else empty.
+    dead_man_s : float or None
+        Dead-man time of the loop's board, where it has one.
     """
 
     loop: str
@@ -62,11 +66,19 @@ class Report:
     record: Record | None
     tuning: Tuning | None
     why_nothing: str = ""
+    dead_man_s: float | None = None
 
     @property
     def suggestion(self) -> dict[str, Any] | None:
         """Keys of a better model table, where they are known."""
         return None if self.tuning is None else suggested(self.table, self.tuning)
+
+    @cached_property
+    def limits(self) -> tuple[Proposal, ...]:
+        """Limits that suit the plant; none where it was not heard."""
+        if self.tuning is None:
+            return ()
+        return proposed(self.tuning, in_force(self.table, self.dead_man_s))
 
     def as_json(self, folder: Path) -> dict[str, Any]:
         """Return the report as one object; None for what is not known."""
@@ -86,6 +98,7 @@ class Report:
             "signal": dataclasses.asdict(self.excitation),
             "samples": 0 if self.record is None else len(self.record.t_s),
             **found,
+            "limits": limits_json(self.limits),
             "suggestion": keys,
             "suggestion_toml": self._toml(),
             "folder": str(folder),
@@ -108,6 +121,7 @@ class Report:
         if self.tuning is None:
             return [*lines, f"Nothing was learnt: {self.why_nothing}"]
         lines += tuning_lines(self.tuning)
+        lines += limit_lines(self.limits)
         toml = self._toml()
         if toml is not None:
             lines += ["", "Suggested for the configuration:", "", *toml.splitlines()]
@@ -117,7 +131,7 @@ class Report:
         keys = self.suggestion
         if keys is None or self.tuning is None:
             return None
-        return suggestion_text(self.loop, keys, self.tuning)
+        return suggestion_text(self.loop, self.table, keys, self.tuning, self.limits)
 
     def write(self, folder: Path) -> list[Path]:
         """Write text, JSON, run and figure; return what was written."""
@@ -130,7 +144,8 @@ class Report:
             written.append(folder / RUN)
         if self.tuning is not None:
             try:
-                written += draw_tuning(self.tuning, self.excitation, [folder / FIGURE])
+                page = [folder / FIGURE]
+                written += draw_tuning(self.tuning, self.excitation, page, self.limits)
             except Unavailable as missing:
                 say([str(missing)])
         return written

@@ -77,28 +77,33 @@ def run_on_board(
         keeper = LatchKeeper(latches, lambda loop: None)  # a latch ends the run: nobody to tell
         keeper.start()
         stack.callback(keeper.close)
+        return _run_and_keep(alone(settings, name), name, excitation, keeper, directory)
 
-        last: dict[str, Cycle] = {}
 
-        def keep(cycle: Cycle) -> None:
-            last[cycle.loop] = cycle
-            for alarm in cycle.step.alarms:
-                if alarm.latched:
-                    keeper.latched(cycle.loop, alarm)
+def _run_and_keep(
+    single: Settings, name: str, excitation: Excitation, keeper: LatchKeeper, directory: Path
+) -> Ran:
+    """Run the loop, its latches kept as they come and its models at the end."""
+    last: dict[str, Cycle] = {}
 
-        clock = MonotonicClock()
-        single = alone(settings, name)
-        ran = _run(
-            name,
-            excitation,
-            clock,
-            lambda publish: loop_for(single, clock, publish, beside=False),
-            keep,
-        )
-        learned = LearnedStore(directory)
-        if ModelKeeper(learned, clock.now_s).store(last, at_end=True):
-            say([f"{learned.path_of(name)} written: the next start begins with what was learnt"])
-        return ran
+    def keep(cycle: Cycle) -> None:
+        last[cycle.loop] = cycle
+        for alarm in cycle.step.alarms:
+            if alarm.latched:
+                keeper.latched(cycle.loop, alarm)
+
+    clock = MonotonicClock()
+    ran = _run(
+        name,
+        excitation,
+        clock,
+        lambda publish: loop_for(single, clock, publish, beside=False),
+        keep,
+    )
+    learned = LearnedStore(directory)
+    if ModelKeeper(learned, clock.now_s).store(last, at_end=True):
+        say([f"{learned.path_of(name)} written: the next start begins with what was learnt"])
+    return ran
 
 
 def _run(

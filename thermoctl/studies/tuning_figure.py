@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from thermoctl.studies.excitation import Excitation
 from thermoctl.studies.orders_figure import draw_posterior
 from thermoctl.studies.replay_figure import draw_record
 from thermoctl.studies.tuning import Tuning
+from thermoctl.studies.tuning_limits import Proposal
+from thermoctl.studies.tuning_words import limit_lines
 from thermoctl.studies.words import number
 
 _HEIGHTS_IN = (1.6, 0.7, 1.2, 1.7)
@@ -20,11 +23,17 @@ _TOP_IN, _BOTTOM_IN = 0.45, 0.5
 _CLOSE_IN, _APART_IN = 0.36, 0.76
 """Between panels of one time axis, and above one that has its own."""
 _LABEL_GAP = 0.09
+_LINE_IN = 0.112
+"""Height of a line of text below the panels."""
 _LAGS_SHOWN, _LEAST_SHOWN = 4.0, 30.0
 
 
-def draw_tuning(tuning: Tuning, excitation: Excitation, paths: list[Path]) -> list[Path]:
+def draw_tuning(
+    tuning: Tuning, excitation: Excitation, paths: list[Path], limits: Sequence[Proposal] = ()
+) -> list[Path]:
     """Draw `tuning` of the run of `excitation` and write it to each of `paths`.
+
+    Below stand the `limits` that are proposed.
 
     Raises
     ------
@@ -38,7 +47,9 @@ def draw_tuning(tuning: Tuning, excitation: Excitation, paths: list[Path]) -> li
     chosen = () if tuning.given else _HEIGHTS_IN[2:3]
     heights = [*_HEIGHTS_IN[:2], *chosen, _HEIGHTS_IN[3]]
     spaces = [_TOP_IN, *[_CLOSE_IN] * (len(heights) - 2), _APART_IN]
-    height = sum(heights) + sum(spaces) + _BOTTOM_IN
+    below = limit_lines(limits)
+    foot_in = _LINE_IN * len(below)
+    height = sum(heights) + sum(spaces) + _BOTTOM_IN + foot_in
     with house.styled(house.WIDE_IN, height, len(heights), 1) as (figure, axes):
         panels = list(axes[:, 0])
         top = height
@@ -50,6 +61,11 @@ def draw_tuning(tuning: Tuning, excitation: Excitation, paths: list[Path]) -> li
         for index, panel in enumerate(panels):
             house.letter(panel, "abcd"[index])
         figure.align_ylabels(panels)
+        if below:
+            figure.text(
+                0.02, (foot_in - 0.5 * _LINE_IN) / height, "\n".join(below[1:]),
+                va="top", family="monospace", fontsize=6.0, linespacing=1.3, color=house.TEXT,
+            )  # fmt: skip
         return [house.save(figure, path) for path in paths]
 
 

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 from thermoctl.studies.laws import parameter_names
 from thermoctl.studies.orders_words import order_text, orders_json, orders_lines, orders_rows
 from thermoctl.studies.plant_words import Bounded, PlantWords
 from thermoctl.studies.tuning import Tuning
+from thermoctl.studies.tuning_limits import Proposal
 from thermoctl.studies.words import duration, number
 
 _WIDTH = 18
 _REFERENCE_LAGS = 3.0
+_LINE, _DEEP = 96, " " * _WIDTH
 
 
 def tuning_json(tuning: Tuning) -> dict[str, Any]:
@@ -127,6 +131,25 @@ def _interval(bounded: Bounded, unit: str) -> str:
     if bounded.high is None:
         return f"at least {bounded.low:.2g} {unit}; the record is too short to tell more"
     return f"{bounded.value:.0f} {unit}, between {bounded.low:.0f} and {bounded.high:.0f}"
+
+
+def limit_lines(limits: Sequence[Proposal]) -> list[str]:
+    """Return a row for each limit with its reasoning below; none without limits."""
+    if not limits:
+        return []
+    rows = ["", _row("Limits", "proposed, and what is configured")]
+    for limit in limits:
+        now = "left out" if limit.now is None else f"{limit.now:g}"
+        value = "leave out" if limit.value is None else f"{limit.value:g}"
+        fits = f"{now} fits" if value in (now, "leave out") else f"{now} fits, {value} would do"
+        rows.append(_row(limit.key, f"{value}, got {now}" if limit.change else fits))
+        rows += textwrap.wrap(limit.why, _LINE, initial_indent=_DEEP, subsequent_indent=_DEEP)
+    return rows
+
+
+def limits_json(limits: Sequence[Proposal]) -> list[dict[str, Any]]:
+    """Return each limit as `key`, `value`, `now`, `change` and `why`."""
+    return [dataclasses.asdict(limit) for limit in limits]
 
 
 def reference_time_s(words: PlantWords) -> float:

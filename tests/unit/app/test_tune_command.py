@@ -14,10 +14,12 @@ from click.testing import CliRunner
 from thermoctl.app.cli import cli
 from thermoctl.app.endings import exit_code_of, words_of
 from thermoctl.app.settings import load
+from thermoctl.app.suggestion import limit_keys
 from thermoctl.app.tune_command import tune_command
 from thermoctl.services.lock import DaemonLock
 from thermoctl.services.store import Latch, LatchStore
 from thermoctl.studies import figure as house
+from thermoctl.studies.tuning_limits import Proposal
 
 BOARD = """
 [boards.daq]
@@ -239,3 +241,31 @@ def test_what_cannot_be_done_is_refused_before_anything_is_made(tmp_path, words,
     assert (code, printed) == (2, "")
     assert message in " ".join(said.split())
     assert not (tmp_path / "tune").exists()
+
+
+def test_the_report_proposes_limits_with_reasons(report):
+    told, folder = report
+    limits = {each["key"]: each for each in told["limits"]}
+    assert set(limits) >= {"trip_above_c", "jump_k", "period_s", "power_max", "dead_man_s"}
+    assert limits["trip_above_c"]["now"] == 60.0
+    assert all(each["why"] for each in limits.values())
+    assert limits["trip_above_c"]["why"].split(";")[0] in (folder / "report.txt").read_text()
+
+
+def test_limits_that_do_not_fit_are_suggested_as_a_table_that_can_be_loaded():
+    text = BOARD.replace("trip_above_c = 60.0", "trip_above_c = 90.0\njump_k = 0.05")
+    Path("far.toml").write_text(text)
+    code, printed, said = run("--sim", "-c", "far.toml", "--duration", "9m", "--json")
+    assert code == 0, said
+    keys = tomllib.loads(json.loads(printed)["suggestion_toml"])["loops"]["tank"]
+    assert 38.5 < keys["trip_above_c"] < 45.0
+    assert keys["jump_k"] >= 0.1
+    load({"loops": {"tank": {"setpoint_c": 37.5, **keys}}})
+
+
+def test_a_trip_that_the_sensor_could_not_show_is_not_suggested():
+    loop = load(tomllib.loads(BOARD)).loops["tank"]
+    beyond = Proposal("trip_above_c", 500.0, 60.0, True, "made")
+    fine = Proposal("power_max", 0.5, 1.0, True, "made")
+    board = Proposal("dead_man_s", 2.5, 60.0, True, "made")
+    assert limit_keys(loop, [beyond, fine, board]) == {"power_max": 0.5}
