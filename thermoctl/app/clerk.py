@@ -15,6 +15,7 @@ from typing import Any, Final, Protocol
 from thermoctl import __version__
 from thermoctl.app.cycle_record import cycle_record, iso_time
 from thermoctl.app.cycle_wire import details_of
+from thermoctl.insight import Insight
 from thermoctl.runtime.asked import Asked
 from thermoctl.services.control_protocol import Call, CallError
 from thermoctl.services.control_socket import Pending
@@ -61,6 +62,8 @@ class Clerk:
         The loop's time in s.
     wall_clock : callable
         Seconds since 1970 UTC.
+    insight : callable
+        What is told of a loop by name, None where nothing is.
     """
 
     def __init__(
@@ -72,10 +75,12 @@ class Clerk:
         state: Path,
         now_s: Callable[[], float],
         wall_clock: Callable[[], float] = time.time,
+        *,
+        insight: Callable[[str], Insight | None] = lambda loop: None,
     ) -> None:
         self._loop, self._seen, self._periods_s = loop, seen, dict(periods_s)
         self._latches, self._state = latches, state
-        self._now_s, self._wall_clock = now_s, wall_clock
+        self._now_s, self._wall_clock, self._insight = now_s, wall_clock, insight
         self.patience_s = _PERIODS * max(self._periods_s.values()) + _SPARE_S
 
     def answer(self, call: Call) -> Mapping[str, Any] | Pending:
@@ -141,7 +146,19 @@ class Clerk:
         cycle = self._seen[name]
         age_s = round(max(0.0, self._now_s() - cycle.step.t_s), 3)
         beside = {"age_s": age_s, "period_s": self._periods_s[name], "missed": cycle.missed}
-        return {**cycle_record(cycle), **beside}
+        return {**cycle_record(cycle), **beside, "insight": self._told(name)}
+
+    def _told(self, name: str) -> dict[str, Any] | None:
+        """Return what is told of the plant beside its last cycle, with times of the wall clock."""
+        insight = self._insight(name)
+        if insight is None:
+            return None
+        began_utc_s = self._wall_clock() - self._now_s()
+        told = dict(insight.as_json())
+        for rows, key in ((told["changes"], "t_s"), (told["drifts"], "since_s")):
+            for row in rows:
+                row["at"] = iso_time(began_utc_s + row[key])
+        return told
 
     def _get(self, call: Call) -> Mapping[str, Any]:
         name = self._one(call)

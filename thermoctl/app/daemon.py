@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 from thermoctl import __version__
 from thermoctl.app.clerk import Clerk
 from thermoctl.app.compose import loop_for
+from thermoctl.app.insight_watch import InsightService, insights_for
 from thermoctl.app.resuming import Resumption, kept_latches
 from thermoctl.app.settings import Settings, default_files, load_all
 from thermoctl.errors import ConfigError
@@ -101,13 +102,7 @@ class Daemon:
         self._latches = LatchStore(directory, make_private(runtime_dir()))
         self._seen = _Seen()
         self._clock = MonotonicClock()
-        self._history: HistoryWriter | None = None
-        if settings.history.enabled:
-            self._history = HistoryWriter(
-                directory / settings.history.file,
-                RunInfo(__version__, settings.as_json()),
-                report=self._journal.emit,
-            )
+        self._history = _history(settings, directory, self._journal.emit)
         self._resumption = Resumption(directory, self._emit)
         learned = LearnedStore(directory)
         self._models = ModelKeeper(learned, self._clock.now_s)
@@ -123,6 +118,7 @@ class Daemon:
             self._latches, self._acknowledged_on_disk, report=self._journal.emit
         )
         self._orders = _order_service(settings, self._emit)
+        self._insight = InsightService(insights_for(settings.loops), self._emit)
         self._clients = self._control_socket(directory, socket)
         self._off = self._failed = self._ready = False
         self._unreached: list[str] = []
@@ -134,7 +130,13 @@ class Daemon:
         place = ControlPlace(own_path() if given is None else checked(given), mode_for())
         periods_s = {name: table.period_s for name, table in self._settings.loops.items()}
         clerk = Clerk(
-            self._loop, self._seen.cycles, periods_s, self._latches, state, self._clock.now_s
+            self._loop,
+            self._seen.cycles,
+            periods_s,
+            self._latches,
+            state,
+            self._clock.now_s,
+            insight=self._insight.insight,
         )
         return ControlSocket(place, clerk, self._emit)
 
@@ -157,6 +159,8 @@ class Daemon:
             if self._orders is not None:
                 self._orders.start()
                 stack.callback(self._orders.close)
+            self._insight.start()
+            stack.callback(self._insight.close)
             self._clients.start()
             stack.callback(self._clients.close)
             self._emit("loop.started", None, loops=list(self._settings.loops), version=__version__)
@@ -241,6 +245,7 @@ class Daemon:
             self._history.publish(cycle)
         if self._orders is not None:
             self._orders.publish(cycle)
+        self._insight.publish(cycle)
         self._clients.publish(cycle)
 
     def _completed(self) -> None:
@@ -281,6 +286,16 @@ class Daemon:
         self._journal.emit(event, loop)
         if self._history is not None:
             self._history.publish_event(event, loop)
+
+
+def _history(
+    settings: Settings, directory: Path, report: Callable[..., None]
+) -> HistoryWriter | None:
+    """Return what writes the history; None where none is kept."""
+    if not settings.history.enabled:
+        return None
+    run = RunInfo(__version__, settings.as_json())
+    return HistoryWriter(directory / settings.history.file, run, report=report)
 
 
 def _order_service(settings: Settings, emit: Callable[..., None]) -> OrderService | None:

@@ -8,16 +8,15 @@ own, behind a bounded feed. Why it lives here and not in the regulator is the de
 from __future__ import annotations
 
 import math
-import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
+from thermoctl.app.beside import Beside, Report
 from thermoctl.app.tables import LoopTable
 from thermoctl.estimation import LainiotisBank, Order
-from thermoctl.services.feed import Feed
 from thermoctl.signals import Cycle, Mode, Quality
 from thermoctl.studies.orders import EVIDENCE, SETTLED, USUAL
 from thermoctl.studies.record import GAP, Columns, Record, RecordError
@@ -43,11 +42,7 @@ FLOORS: Final = 0.01
 """Probability of all candidates together that are as improbable as they may become."""
 
 _MEAN_SHARE = 0.02
-_FEED = 1_200
-_TURN_S = 0.5
 _NAMES = Columns("temperature_c", "accepted_power", "t_s")
-
-Report = Callable[..., None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +186,7 @@ def watches_for(loops: Mapping[str, LoopTable]) -> dict[str, OrderWatch]:
     return watches
 
 
-class OrderService:
+class OrderService(Beside[OrderWatch]):
     """Runs watches in a thread; one that fails is dropped and told of.
 
     Parameters
@@ -203,53 +198,17 @@ class OrderService:
     """
 
     def __init__(self, watches: Mapping[str, OrderWatch], report: Report) -> None:
-        self._watches, self._report = dict(watches), report
+        super().__init__("orders", "orders.failed", watches, report)
         self._named: dict[str, Order] = {}
-        self._feed: Feed[Cycle] = Feed(_FEED)
-        self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="orders", daemon=True)
-
-    def start(self) -> None:
-        """Begin to weigh."""
-        self._thread.start()
-
-    def publish(self, cycle: Cycle) -> None:
-        """Take a finished cycle and return at once; a slow thread loses the oldest."""
-        self._feed.put(cycle)
-
-    def step(self, cycle: Cycle) -> None:
-        """Take a finished cycle and look at it at once, as a simulation may."""
-        self.publish(cycle)
-        self.turn()
-
-    def close(self, timeout_s: float = 1.0) -> None:
-        """End the thread; what it has not looked at is nobody's loss."""
-        self._closing.set()
-        if self._thread.is_alive():
-            self._thread.join(timeout_s)
 
     def keys(self, loop: str) -> dict[str, Any]:
         """Return the keys a line of JSON on `loop` gets, none while nothing is known."""
         watch = self._watches.get(loop)
         return {} if watch is None or watch.finding is None else watch.finding.as_json()
 
-    def turn(self) -> None:
-        """Look at what was published since the last turn; one turn of the thread."""
-        for cycle in self._feed.take():
-            if self._closing.is_set():
-                return
-            self._look(cycle)
-
-    def _look(self, cycle: Cycle) -> None:
-        watch = self._watches.get(cycle.loop)
-        if watch is None:
-            return
-        try:
-            found = watch.take(cycle)
-        except Exception as error:  # noqa: BLE001 - the loop goes on without it
-            del self._watches[cycle.loop]
-            self._report("orders.failed", cycle.loop, error=f"{type(error).__name__}: {error}")
-            return
+    def look(self, watch: OrderWatch, cycle: Cycle) -> None:
+        """Show `cycle` to its watch, and tell of an order that is newly found."""
+        found = watch.take(cycle)
         if found is not None:
             self._tell(cycle.loop, found)
 
@@ -265,7 +224,3 @@ class OrderService:
             probability=round(found.probability, 4),
             before=None if before is None else [before.n, before.m, before.delay],
         )
-
-    def _run(self) -> None:
-        while not self._closing.wait(_TURN_S):
-            self.turn()

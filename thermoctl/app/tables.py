@@ -202,6 +202,9 @@ class LoopTable(Table):
     rise_per_s: Positive | None = Field(
         None, description="Most the power may move away from 0 in a second."
     )
+    heater_w: Positive | None = Field(
+        None, description="Rated power of the heater in W; with it, watts and litres are told."
+    )
     jump_k: Positive = Field(
         1.0,
         description="A reading farther off than this may be an outlier; left out, it is at least "

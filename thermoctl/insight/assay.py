@@ -67,7 +67,7 @@ class Assay:
 
 
 def noise_of(stretch: Stretch, lag_s: float, gain_k_per_s: float) -> Array | None:
-    """Return what whitens the noise of a stretch at rest, shape (n,); None: too short.
+    """Return what whitens a stretch at rest, shape (n,); None: too short.
 
     Parameters
     ----------

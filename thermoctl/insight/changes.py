@@ -76,7 +76,7 @@ _TRUSTED = 12
 
 
 class Usual:
-    """How far a deviation usually is from 0: a root mean square with a memory of `length`."""
+    """How far a deviation usually is from 0: a root mean square with a memory."""
 
     def __init__(self, length: int) -> None:
         self._length, self.count, self._square = length, 0, 0.0

@@ -40,7 +40,7 @@ class Compared:
         return (self.now.value - self.before.value) / sd if sd > 0.0 else math.nan
 
     def beyond(self, share: float) -> bool:
-        """Return whether it moved by `share`, which may be negative, and out of all error."""
+        """Return whether it moved by `share`, up or down, and out of all error."""
         if share < 0.0:
             return self.share <= share and self.sigmas <= -SIGMAS
         return self.share >= share and self.sigmas >= SIGMAS

@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from types import MappingProxyType
 
 from thermoctl.insight.drifts import Baseline, Compared, Lasting
-from thermoctl.insight.reckoning import Reckoned
 from thermoctl.insight.rows import Known
 from thermoctl.insight.values import Drift
 from thermoctl.insight.wording import plain
@@ -32,9 +30,6 @@ GAIN_UP, GAIN_DOWN = 0.25, -0.2
 """Gain of a move, as a share."""
 UNLIKE = 0.06
 """Two moves that differ give gains that differ by so much: the glass follows later."""
-REST_UP, REST_DOWN = 0.4, -0.3
-"""Gain at rest, as a share; it is known far less well."""
-REST_LEARNT, REST_MEMORY = 3, 6
 NORMAL_AFTER = 48
 """A power to hold that stays up for so many turns is the usual one from then on."""
 
@@ -52,7 +47,6 @@ class Faults:
         self._active: dict[str, Drift] = {}
         self._more_power, self._more_noise = Lasting(POWER_UP, 2), Lasting(NOISE_UP, 2)
         self._water, self._element = Lasting(GAIN_UP, 1), Lasting(GAIN_DOWN, 1)
-        self._water_at_rest, self._weak_at_rest = Lasting(REST_UP, 2), Lasting(REST_DOWN, 2)
         self._first: Known | None = None
         self._diluted = 1.0
         self._up_for = 0
@@ -62,7 +56,6 @@ class Faults:
     def settle_anew(self) -> None:
         """Begin new baselines of what depends on the set point."""
         self._power = Baseline(LEARNT, MEMORY, RECENT)
-        self._at_rest = Baseline(REST_LEARNT, REST_MEMORY, RECENT)
 
     @property
     def active(self) -> Mapping[str, Drift]:
@@ -93,11 +86,8 @@ class Faults:
         """Note that cold water may have come in, as a `share` of what was there."""
         self._diluted /= 1.0 + share
 
-    def reckon(self, reckoned: Reckoned) -> Compared | None:
-        """Take a gain; return the comparison that changed what stands, if one did."""
-        gain = reckoned.assay.gain
-        if not reckoned.moved:
-            return self._reckon_at_rest(reckoned.t_s, gain)
+    def reckon(self, t_s: float, gain: Known) -> Compared | None:
+        """Take the gain of a move; return the comparison if it changed what stands."""
         if self._first is None:
             self._first = gain
             return None
@@ -105,33 +95,13 @@ class Faults:
         least = Compared(compared.before.scaled(self._diluted), compared.now)
         changed = self._water.after(compared)
         changed = self._element.after(least) or changed
-        self._water_at_rest.end()
-        self._weak_at_rest.end()
-        self._tell_gain(reckoned.t_s, compared)
-        return compared if changed else None
-
-    def _reckon_at_rest(self, t_s: float, gain: Known) -> Compared | None:
-        stands = self._water_at_rest.stands or self._weak_at_rest.stands
-        compared = self._at_rest.after(gain.value, follow=not stands)
-        if compared is None:
-            return None
-        sd = max(compared.now.sd, gain.sd / math.sqrt(RECENT))
-        compared = replace(compared, now=replace(compared.now, sd=sd))
-        changed = self._water_at_rest.after(compared)
-        changed = self._weak_at_rest.after(compared) or changed
-        if changed:
-            self._tell_gain(t_s, compared)
+        self._tell(WATER, self._water.stands, t_s, compared, _water_words)
+        self._tell(ELEMENT, self._element.stands, t_s, compared, _element_words)
+        if self._element.stands:
+            self._active.pop(LOSS, None)
         return compared if changed else None
 
     # -- what is told ----------------------------------------------------------------------------
-
-    def _tell_gain(self, t_s: float, compared: Compared) -> None:
-        water = self._water.stands or self._water_at_rest.stands
-        weak = self._element.stands or self._weak_at_rest.stands
-        self._tell(WATER, water, t_s, compared, _water_words)
-        self._tell(ELEMENT, weak, t_s, compared, _element_words)
-        if weak:
-            self._active.pop(LOSS, None)
 
     def _tell(self, name: str, stands: bool, t_s: float, compared: Compared, words: Words) -> None:
         if not stands:

@@ -56,7 +56,7 @@ class Harris:
 
 
 def harris(error: Array, delay: int, order: int = ORDER) -> Harris | None:
-    """Return the index of control errors; None where they do not vary, or are too few.
+    """Return the index of control errors; None: still, or too few.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def harris(error: Array, delay: int, order: int = ORDER) -> Harris | None:
 
 
 def autoregression(e: Array, order: int) -> tuple[Array, float]:
-    """Return the coefficients of e on its past, shape (order,), and what is left over.
+    """Return coefficients of e on its past, shape (order,), and what is left.
 
     Least squares by its normal equations, with the variance per degree of freedom.
     """
@@ -104,7 +104,7 @@ def autoregression(e: Array, order: int) -> tuple[Array, float]:
 
 
 def impulse_response(coefficients: Array, length: int) -> Array:
-    """Return the first weights psi of an autoregression, shape (length,), the first being 1."""
+    """Return the first weights psi of an autoregression, shape (length,)."""
     psi = np.zeros(length)
     psi[0] = 1.0
     for i in range(1, length):

@@ -57,6 +57,6 @@ class Lagging:
 
 
 def felt(power: Array, lag_s: float, period_s: float) -> Array:
-    """Return `power`, shape (N,), as it is felt; before the first it was as the first."""
+    """Return `power`, shape (N,), as felt; before the first it was the same."""
     lagging = Lagging(lag_s, period_s, float(power[0]))
     return np.array([lagging.after(each) for each in power.tolist()])

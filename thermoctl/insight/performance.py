@@ -70,7 +70,7 @@ class PerformanceWatch:
     def after(
         self, t_s: float, reading_c: float, setpoint_c: float, power: float, lag_s: float, sd: float
     ) -> Performance:
-        """Take a sample of a loop at rest; return the judgement, which may be a minute old.
+        """Take a sample at rest; return the judgement, at most a minute old.
 
         Parameters
         ----------
@@ -196,7 +196,7 @@ def cycle_s(error: Array, period_s: float, lag_s: float) -> float | None:
 
 
 def sluggish(error: Array, period_s: float, lag_s: float) -> bool:
-    """Return whether errors stay on one side for longer than two lags, as one that leans does."""
+    """Return whether errors stay on one side for longer than two lags."""
     e = error - error.mean()
     reach = min(len(e) // 4, math.ceil(2.0 * lag_s / period_s))
     return bool(reach > 0 and np.all(autocorrelation(e, reach) > 0.3))

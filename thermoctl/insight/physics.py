@@ -23,7 +23,7 @@ def litres(capacity: float) -> float:
 
 
 def cold_water_kg(capacity: float, fall_k: float, temperature_c: float) -> float | None:
-    """Return how much water of `COLD_C` lowers `temperature_c` by `fall_k`; None: none does.
+    """Return how much water of `COLD_C` makes a fall; None: none does.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def cold_water_kg(capacity: float, fall_k: float, temperature_c: float) -> float
 
 
 def ice_kg(capacity: float, fall_k: float, temperature_c: float) -> float | None:
-    """Return how much ice of 0 degC lowers `temperature_c` by `fall_k`; None: none does."""
+    """Return how much ice of 0 degC makes a fall; None: none does."""
     after_c = temperature_c - fall_k
     if after_c < 0.0:
         return None

@@ -1,4 +1,4 @@
-"""Whether a loop is at rest: held at its set point, and nobody moved it on purpose."""
+"""Whether a loop is at rest: held, and not moved on purpose."""
 
 from __future__ import annotations
 

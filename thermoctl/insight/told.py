@@ -70,24 +70,20 @@ def _slope(t_s: float, slope: Known, capacity: float | None) -> Change:
     return Change(t_s, kind, per_min.value, _SIGMAS * per_min.sd, "K/min", words)
 
 
-def change_of_gain(t_s: float, compared: Compared, *, at_rest: bool) -> Change:
+def change_of_gain(t_s: float, compared: Compared) -> Change:
     """Return a change of the gain as it is told.
 
     Parameters
     ----------
     t_s : float
-        When the stretch began in which it was first seen.
+        When the move began in which it was first seen.
     compared : Compared
         The gain before and now.
-    at_rest : bool
-        It was seen at rest, and so is known less well.
     """
     share = 100.0 * compared.share
     sd = 100.0 * abs(compared.now.value / compared.before.value) * _relative_sd(compared)
     way = "up" if share > 0.0 else "down"
-    words = f"gain {way} by {number(abs(share), sd)} %"
-    if at_rest:
-        words += ", seen at rest"
+    words = f"gain {way} by {number(abs(share), sd)} %, seen when the loop was moved"
     return Change(t_s, f"gain.{way}", share, _SIGMAS * sd, "%", words)
 
 
@@ -97,13 +93,13 @@ def _relative_sd(compared: Compared) -> float:
 
 
 def dilution(found: Found) -> float:
-    """Return how much water a step would be, as a share of what was there; 0 where it rose."""
+    """Return how much cold water a step would be, as a share of what was there."""
     fall_k = -(found.step_k or 0.0)
     left_k = found.before_c - fall_k - physics.COLD_C
     return fall_k / left_k if fall_k > 0.0 and left_k > 0.0 else 0.0
 
 
 def jump_at(t_s: float) -> Change:
-    """Return a jump of the water that nobody could measure."""
-    words = "the water jumped, by how much cannot be told while the loop moves"
+    """Return a jump of the readings that nobody could measure."""
+    words = "the readings jumped while the loop moved: heat came or went, or the gain is another"
     return Change(t_s, "jump", None, None, "K", words)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from collections import deque
 
+from thermoctl.insight.assay import Assay
 from thermoctl.insight.changes import ChangeWatch, Found
-from thermoctl.insight.drifts import Compared
-from thermoctl.insight.faults import TURN_LAGS, TURN_S, Faults
+from thermoctl.insight.faults import ELEMENT, TURN_LAGS, TURN_S, Faults
 from thermoctl.insight.gate import GateWatch
 from thermoctl.insight.performance import PerformanceWatch
-from thermoctl.insight.reckoning import Reckoned, Reckoning
+from thermoctl.insight.reckoning import Reckoning
 from thermoctl.insight.rest import Rest
 from thermoctl.insight.rows import Known, rows
 from thermoctl.insight.samples import Samples
@@ -33,7 +33,7 @@ ROWS_S = 5.0
 """Time from one set of rows to the next."""
 GAIN_MOVED = 1.1
 """A gain that has moved by this factor makes the balance begin anew."""
-LAG_MOVED = 1.5
+LAG_MOVED = 2.5
 """A lag that has moved by this factor makes everything begin anew."""
 
 
@@ -130,7 +130,7 @@ class Insights:
             self._jumped(step.t_s)
         reckoned = known.reckoning.after(step.t_s, self._rest)
         if reckoned is not None:
-            self._reckoned(reckoned)
+            self._reckoned(step.t_s, reckoned)
         if good and self._rest.lasts_s(step.t_s) > 0.0 and not known.changes.busy:
             self._at_rest(step, plant, reading_c)
 
@@ -158,7 +158,7 @@ class Insights:
     def _found(self, t_s: float, found: Found) -> None:
         known = self._known
         assert known is not None
-        self._changes.appendleft(change_of(found, known.gain, self._heater_w))
+        self._changes.appendleft(change_of(found, known.gain, self._given_w()))
         known.reckoning.disturb(t_s)
         self._power = _Turn()
         if found.step_k is not None:
@@ -174,17 +174,13 @@ class Insights:
         if first and moving and not known.changes.busy:
             self._changes.appendleft(jump_at(t_s))
 
-    def _reckoned(self, reckoned: Reckoned) -> None:
+    def _reckoned(self, t_s: float, found: Assay) -> None:
         known = self._known
         assert known is not None
-        compared = self._faults.reckon(reckoned)
-        if reckoned.moved:
-            known.assayed(reckoned, self._applied)
+        compared = self._faults.reckon(t_s, found.gain)
+        known.assayed(found, self._applied)
         if compared is not None:
-            self._changes.appendleft(self._gain_changed(reckoned, compared))
-
-    def _gain_changed(self, reckoned: Reckoned, compared: Compared) -> Change:
-        return change_of_gain(reckoned.began_s, compared, at_rest=not reckoned.moved)
+            self._changes.appendleft(change_of_gain(self._rest.moved_s, compared))
 
     # -- telling ---------------------------------------------------------------------------------
 
@@ -200,7 +196,7 @@ class Insights:
                 plant,
                 known.gain if known is not None and sure else gain,
                 known.slope if known is not None else None,
-                self._heater_w,
+                self._given_w(),
             )
         self._now = Insight(
             step.t_s,
@@ -210,6 +206,13 @@ class Insights:
             tuple(self._faults.active.values()),
             self._performance.now,
         )
+
+    def _given_w(self) -> float | None:
+        """Return what the heater gives: less than it is rated where its element is weak."""
+        weak = self._faults.active.get(ELEMENT)
+        if weak is None or self._heater_w is None:
+            return self._heater_w
+        return self._heater_w * weak.now / weak.before
 
     def _news_of_changes(self, t_s: float, newest: Change | None) -> list[Event]:
         """Return the events of changes since `newest`, oldest first."""
@@ -287,9 +290,9 @@ class _Known:
     def _watch_changes(self, power: float) -> None:
         self.changes = ChangeWatch(self._period_s, self.lag_s, self.gain.value, power)
 
-    def assayed(self, reckoned: Reckoned, power: float) -> None:
+    def assayed(self, found: Assay, power: float) -> None:
         """Take over a gain that was assayed on a move."""
-        self.gain = reckoned.assay.gain
-        self.slope = reckoned.assay.slope or self.slope
+        self.gain = found.gain
+        self.slope = found.slope or self.slope
         if not 1.0 / GAIN_MOVED <= self.gain.value / self.changes.gain_k_per_s <= GAIN_MOVED:
             self._watch_changes(power)
