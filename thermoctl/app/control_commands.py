@@ -17,11 +17,12 @@ from typing import Any, Final
 import click
 
 from thermoctl.app.endings import EXIT_ALARM, EXIT_FAILED
-from thermoctl.app.insight_words import insight_lines
 from thermoctl.app.live import numbers
+from thermoctl.app.live.score import shadow_words
 from thermoctl.app.options import Parsed, examples, json_option, loop_option, socket_option
 from thermoctl.errors import Refused
 from thermoctl.services.control_client import ControlClient
+from thermoctl.signals import ShadowScore
 
 _LATE_PERIODS: Final = 3.0
 _LATE_S: Final = 3.0
@@ -92,7 +93,7 @@ def get(key: str, loop: str | None, socket: Path | None, as_json: bool) -> None:
     """Show one value of `status --json`, bare."""
     with ControlClient(socket) as client:
         value = client.ask("get", key=key, loop=loop)["value"]
-    if as_json or isinstance(value, dict):
+    if as_json:
         click.echo(json.dumps(value))
     elif value is None:
         raise Refused(f"expected {key} to be known, and it is not at this moment")
@@ -215,7 +216,7 @@ def _described(record: Mapping[str, Any]) -> str:
     """Return the status of one loop, a line a value, the colons below each other."""
     missing = record["temperature_c"] is None
     deviation_k = None if missing else record["temperature_c"] - record["setpoint_c"]
-    rows: dict[str, Any] = {
+    rows = {
         "Loop": record["loop"],
         "Temperature": numbers.temperature(record["temperature_c"]),
         "Reading": record["quality"],
@@ -226,13 +227,26 @@ def _described(record: Mapping[str, Any]) -> str:
         "Mode": record["mode"],
         "State": record["state"],
         "Controller": record["controller"],
+        **_shadow(record),
         "Alarms": " ".join(record["alarms"]) or "none",
         "Age": numbers.age(record["age_s"]),
         "Cycles missed": record["missed"],
     }
-    lines = [*rows.items(), *insight_lines(record.get("insight"))]
-    width = max(len(name) for name, _ in lines)
-    return _plain("\n".join(f"{name:<{width}} : {value}" for name, value in lines))
+    width = max(map(len, rows))
+    return _plain("\n".join(f"{name:<{width}} : {value}" for name, value in rows.items()))
+
+
+def _shadow(record: Mapping[str, Any]) -> dict[str, str]:
+    """Return the lines about the controller in shadow; none without one."""
+    if record["shadow"] is None:
+        return {}
+    told = record["shadow_score"]
+    score = None if told is None else ShadowScore(**told)
+    over = "" if score is None else f"over {numbers.span(score.span_s)} "
+    return {
+        "Shadow": f"{record['shadow']} {numbers.power(record['shadow_power'])}",
+        "Shadow score": over + ", ".join(shadow_words(score)),
+    }
 
 
 def _line(record: Mapping[str, Any]) -> str:

@@ -33,7 +33,7 @@ def with_unit(digits: str, unit: str) -> str:
 
 
 def plus_minus(value: float, error: float, decimals: int) -> str:
-    """Return `value` ± `error` with the same decimals; without ± where that is not known."""
+    """Return `value` ± `error` with the same decimals; no ± where that is unknown."""
     digits, more = number(value, decimals), number(error, decimals)
     return digits if UNKNOWN in (digits, more) else f"{digits} ± {more}"
 

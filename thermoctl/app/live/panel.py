@@ -21,9 +21,9 @@ _VALUE, _ERROR, _UNIT, _UNIT_RIGHT = 8, 11, 6, 7
 _OWN = (items.pole, items.gain, items.holding, items.innovation)
 """What a loop tells that nobody watches beside its controller."""
 
-_PHYSICAL = (items.gain, items.loss, items.holding, items.lag, items.water, items.noise)
+_PHYSICAL = (items.gain, items.loss, items.holding, items.lag, items.water, items.pole)
 _HEALTH = (items.inflation, items.white, items.deviation, items.tick)
-_FURTHER = (items.pole, items.innovation)
+_FURTHER = (items.innovation, items.noise)
 
 _GATES = {
     Gate.LEARNING: "learning",

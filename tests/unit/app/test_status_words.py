@@ -1,0 +1,40 @@
+"""What `thermoctl status` says of a loop with a controller in shadow."""
+
+from dataclasses import asdict
+
+import pytest
+
+from thermoctl.app.control_commands import _described
+from thermoctl.app.cycle_record import cycle_record
+from thermoctl.app.sim import bench_settings, simulate
+from thermoctl.signals import ShadowScore
+
+
+@pytest.fixture(scope="module")
+def record():
+    """The record of a loop after a few seconds, as a status holds it."""
+    cycle = list(simulate(bench_settings(seed=1), 5.0))[-1]
+    return cycle_record(cycle) | {"age_s": 0.2, "period_s": 1.0, "missed": 0}
+
+
+def rows(record):
+    """Return the lines of a status by their name; the colons stand below each other."""
+    lines = [line.split(" : ") for line in _described(record).splitlines()]
+    assert len({len(name) for name, _ in lines}) == 1
+    return {name.strip(): value for name, value in lines}
+
+
+def test_a_shadow_has_its_name_its_power_and_its_score_in_words(record):
+    score = asdict(ShadowScore(600.0, 0.013, 0.5, 0.8, 0.021, 0.025))
+    told = rows(record | {"shadow_power": 0.2, "shadow_score": score})
+    assert told["Shadow"] == "self-tuning-mv 20.0 %"
+    words = "over 10 min 1.3 % apart, moves 1.6 × as much, misses by 25 mK, not 21 mK"
+    assert told["Shadow score"] == words
+
+
+def test_a_shadow_that_is_not_compared_yet_says_so(record):
+    assert rows(record)["Shadow score"] == "compared after a minute in auto"
+
+
+def test_a_loop_without_a_shadow_has_no_line_of_it(record):
+    assert "Shadow" not in rows(record | {"shadow": None})
