@@ -17,6 +17,7 @@ from typing import Any, Final
 import click
 
 from thermoctl.app.endings import EXIT_ALARM, EXIT_FAILED
+from thermoctl.app.insight_words import insight_lines
 from thermoctl.app.live import numbers
 from thermoctl.app.live.score import shadow_words
 from thermoctl.app.options import Parsed, examples, json_option, loop_option, socket_option
@@ -93,7 +94,7 @@ def get(key: str, loop: str | None, socket: Path | None, as_json: bool) -> None:
     """Show one value of `status --json`, bare."""
     with ControlClient(socket) as client:
         value = client.ask("get", key=key, loop=loop)["value"]
-    if as_json:
+    if as_json or isinstance(value, dict):
         click.echo(json.dumps(value))
     elif value is None:
         raise Refused(f"expected {key} to be known, and it is not at this moment")
@@ -216,7 +217,7 @@ def _described(record: Mapping[str, Any]) -> str:
     """Return the status of one loop, a line a value, the colons below each other."""
     missing = record["temperature_c"] is None
     deviation_k = None if missing else record["temperature_c"] - record["setpoint_c"]
-    rows = {
+    rows: dict[str, Any] = {
         "Loop": record["loop"],
         "Temperature": numbers.temperature(record["temperature_c"]),
         "Reading": record["quality"],
@@ -232,8 +233,9 @@ def _described(record: Mapping[str, Any]) -> str:
         "Age": numbers.age(record["age_s"]),
         "Cycles missed": record["missed"],
     }
-    width = max(map(len, rows))
-    return _plain("\n".join(f"{name:<{width}} : {value}" for name, value in rows.items()))
+    lines = [*rows.items(), *insight_lines(record.get("insight"))]
+    width = max(len(name) for name, _ in lines)
+    return _plain("\n".join(f"{name:<{width}} : {value}" for name, value in lines))
 
 
 def _shadow(record: Mapping[str, Any]) -> dict[str, str]:
