@@ -16,14 +16,17 @@ import serial
 from pydantic import BaseModel
 
 from thermoctl.app import plugins
+from thermoctl.app.cascades import cascade_errors
 from thermoctl.app.parts import law_for, plan_for, sensor_for
 from thermoctl.app.plugins import BadOption
 from thermoctl.app.settings import Settings
-from thermoctl.app.tables import LoopTable
+from thermoctl.app.tables import CascadeTable, LoopTable
 from thermoctl.errors import ConfigError, LinkError
+from thermoctl.model.actuator import Linear
 from thermoctl.ports import Board, Clock, Remembered
 from thermoctl.regulator import Regulator
 from thermoctl.regulator.recollection import NOTHING
+from thermoctl.runtime.cascade import Lead
 from thermoctl.runtime.connection import Connection
 from thermoctl.runtime.loop import Loop, Publish
 from thermoctl.runtime.wiring import Output, Wiring
@@ -156,6 +159,8 @@ def wiring_errors(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
 
     Such a configuration may still be studied, or run on simulated boards; nothing is opened here.
     """
+    for below, text in cascade_errors(settings.loops):
+        yield ("loops", *below), text
     periods = sorted({table.period_s for table in settings.loops.values()})
     for name, table in settings.loops.items():
         for part in ("sensor", "actuator"):
@@ -201,12 +206,12 @@ def _wiring(
     sensor, actuator, cooler = table.sensor, table.actuator, table.cooler
     if sensor is None or actuator is None:
         raise ConfigError(f"loop {name!r} needs a sensor and an actuator to run")
+    read = name, regulator, boards[sensor.board], sensor.input, sensor_for(sensor)
+    if isinstance(actuator, CascadeTable):
+        lead = Lead(actuator.loop, actuator.low_c, actuator.high_c)
+        return Wiring(*read, None, "", Linear(), lead=lead)
     return Wiring(
-        name,
-        regulator,
-        boards[sensor.board],
-        sensor.input,
-        sensor_for(sensor),
+        *read,
         boards[actuator.board],
         actuator.output,
         law_for(actuator),

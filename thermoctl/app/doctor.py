@@ -186,9 +186,10 @@ class _Visit:
         yield Finding(OK, self._check, f"{who.kind} {who.name}, version {who.version}")
         yield self._dead_man()
         outputs = {
-            table.actuator.output: 0.0
+            each.output: 0.0
             for table in self._settings.loops.values()
-            if table.actuator is not None and table.actuator.board == self._name
+            for each in table.outputs
+            if each.board == self._name
         }
         taken = board.write(outputs, _VALID_S, deadline_s) if outputs else {}
         for output, power in taken.items():

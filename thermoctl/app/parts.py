@@ -90,6 +90,8 @@ def _check_action(loop: LoopTable, name: str, law: Controller | None, charge: Co
             f"expected {HEAT_COOL!r} of a loop that has a cooler, {law.name} is for {action!r}",
             path,
         )
+    if loop.leads is not None and action != HEAT:
+        raise BadOption(f"expected {HEAT!r}: more power is a higher set point of the next", path)
     if action != action_of(charge):
         raise BadOption(f"expected {action_of(charge)!r} as in charge, got {action!r}", path)
 
@@ -161,6 +163,8 @@ def _limits(table: LoopTable, controller: Controller) -> Limits:
         power_min=0.0 if cooler is None else -cooler.power_max,
         changeover_s=0.0 if cooler is None else cooler.changeover_s,
         power_cools=action_of(controller) == COOL,
+        # A block that cools down gives more than the loop above it asks for; that is no fault.
+        applied_tolerance=Limits.APPLIED_TOLERANCE if table.leads is None else 1.0,
     )
 
 

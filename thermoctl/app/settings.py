@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import BaseModel, Field, SerializeAsAny, ValidationError
 
 from thermoctl.app import plugins
+from thermoctl.app.cascades import cascade_errors
 from thermoctl.app.document import BadConfiguration, Document, KeyPath, Problem, read_document
 from thermoctl.app.parts import check_parts
 from thermoctl.app.tables import HistoryTable, LoopTable, ServiceTable, Table
@@ -136,6 +137,10 @@ class _Reading:
                     check_parts(loop)
                 except plugins.BadOption as error:
                     self._blame(("loops", name, *error.path), error.text)
+        known = {name: each for name, each in loops.items() if isinstance(each, LoopTable)}
+        if len(known) == len(loops):
+            for below, text in cascade_errors(known):
+                self._blame(("loops", *below), text)
         if not loops and not self._problems:
             self._blame(("loops",), "expected at least one table [loops.NAME], got none")
         return loops

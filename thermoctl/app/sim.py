@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from thermoctl.app.compose import loop_for, started_as
 from thermoctl.app.parts import COOL, action_of, plan_for
 from thermoctl.app.settings import Settings, load
-from thermoctl.app.tables import LoopTable, SensorTable
+from thermoctl.app.tables import ActuatorTable, LoopTable, SensorTable
 from thermoctl.errors import ConfigError
 from thermoctl.quantities import clamp
 from thermoctl.runtime.clock import SimulatedClock
@@ -138,10 +138,12 @@ def _tank_for(board: str, settings: Settings, mains_hz: float) -> SimulatedSetti
 def _rewired(table: LoopTable, tanks: Mapping[str, SimulatedSettings]) -> LoopTable:
     """Return `table` with the sensor and the channels that a simulated board has."""
     sensor, actuator = table.sensor, table.actuator
+    if table.leads is not None and sensor is not None and sensor.board in tanks:
+        raise ConfigError("a loop that leads another one needs simulated boards to be simulated")
     if sensor is not None and sensor.board in tanks:
         reference_v = tanks[sensor.board].reference_v
         sensor = SensorTable(board=sensor.board, curve="lm335", reference_v=reference_v)
-    if actuator is not None and actuator.board in tanks:
+    if isinstance(actuator, ActuatorTable) and actuator.board in tanks:
         alone = action_of(plan_for(table).controller) == COOL
         actuator = actuator.model_copy(update=_COOLER if alone else {"output": "heater"})
     cooler = table.cooler

@@ -5,7 +5,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    field_validator,
+    model_validator,
+)
 
 from thermoctl.estimation import LainiotisBank, Order
 from thermoctl.signals import Mode
@@ -79,6 +87,33 @@ class ActuatorTable(Table):
         "linear", description="linear: the board takes power itself; square: P ~ V^2; ..."
     )
     cycles: int = Field(50, ge=1, description="Mains cycles of one burst, for law burst.")
+
+
+class CascadeTable(Table):
+    """Table ``[loops.NAME.actuator]`` of a loop that gives another one its set point."""
+
+    loop: str = Field(description="Name of the loop that follows.")
+    low_c: Celsius = Field(description="Its set point at power 0.")
+    high_c: Celsius = Field(description="Its set point at full power.")
+
+    @model_validator(mode="after")
+    def _low_below_high(self) -> Self:
+        if not self.low_c < self.high_c:
+            raise ValueError(f"low_c {self.low_c:g} must lie below high_c {self.high_c:g}")
+        return self
+
+
+def _what_acts(value: Any) -> str:
+    """Return which of the two tables of an actuator `value` is: it has a loop, or a board."""
+    leads = "loop" in value if isinstance(value, dict) else isinstance(value, CascadeTable)
+    return "<loop>" if leads else "<board>"
+
+
+Actuator = Annotated[
+    Annotated[ActuatorTable, Tag("<board>")] | Annotated[CascadeTable, Tag("<loop>")],
+    Discriminator(_what_acts),
+]
+"""An output, or another loop. Its tags are in brackets, for no key is: a path leaves them out."""
 
 
 class CoolerTable(ActuatorTable):
@@ -212,7 +247,11 @@ class LoopTable(Table):
         "that the controller believes in.",
     )
     sensor: SensorTable | None = None
-    actuator: ActuatorTable | None = None
+    actuator: Actuator | None = Field(
+        None,
+        description="Table `[loops.NAME.actuator]`: which output, and how power becomes its drive; "
+        "or which loop follows, and how power becomes its set point.",
+    )
     cooler: CoolerTable | None = None
     controller: Options = Field(
         default_factory=lambda: Options(kind="adaptive"),
@@ -262,7 +301,13 @@ class LoopTable(Table):
     @property
     def outputs(self) -> tuple[ActuatorTable, ...]:
         """The outputs that this loop drives, the heater's or the only one first."""
-        return tuple(each for each in (self.actuator, self.cooler) if each is not None)
+        both = (self.actuator, self.cooler)
+        return tuple(each for each in both if isinstance(each, ActuatorTable))
+
+    @property
+    def leads(self) -> CascadeTable | None:
+        """The loop that this one leads, None where it drives outputs."""
+        return self.actuator if isinstance(self.actuator, CascadeTable) else None
 
     @property
     def weighs_orders(self) -> bool:

@@ -212,8 +212,8 @@ def _consent(settings: Settings, name: str, excitation: Excitation, asked: _Aske
     """Ask before a real board heats; raise `Refused` when the answer is no."""
     if asked.yes:
         return
-    actuator = settings.loop(name)[1].actuator
-    board = actuator.board if actuator is not None else "none"
+    outputs = settings.loop(name)[1].outputs
+    board = outputs[0].board if outputs else "none"
     place = getattr(settings.boards.get(board), "port", None)
     click.echo(
         f"Loop {name} will heat through board {board}{f' at {place}' if place else ''}:"

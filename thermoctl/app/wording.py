@@ -19,6 +19,8 @@ KeyPath = tuple[str, ...]
 _LONGEST = 60
 _MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")
 """A member of an enumeration as Python shows it, and the word in it."""
+_TAG = re.compile(r"<\w+>")
+"""Which one of several tables was meant; not a key."""
 _EXPECTED = {
     "float_type": "a number",
     "float_parsing": "a number",
@@ -60,7 +62,7 @@ def reasons(error: ValidationError, model: type[BaseModel]) -> list[tuple[KeyPat
     """Return a path below `model` and a sentence for each complaint of `error`."""
     told = []
     for each in error.errors(include_url=False):
-        path = tuple(str(part) for part in each["loc"])
+        path = tuple(str(part) for part in each["loc"] if not _TAG.fullmatch(str(part)))
         told.append((path, _reason(each, path, known_keys(model, path[:-1]))))
     return told
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from thermoctl.errors import Refused
 from thermoctl.quantities import clamp, is_finite_number
 
+_APPLIED_TOLERANCE = 0.1
 _NO_FINITE_NUMBER = ("rise_per_s", "jump_widens", "power_cools")
 
 
@@ -52,12 +53,13 @@ class Limits:
     power_max: float = 1.0
     rise_per_s: float = math.inf
     jump_k: float = 1.0
-    applied_tolerance: float = 0.1
+    applied_tolerance: float = _APPLIED_TOLERANCE
     jump_widens: bool = True
     power_min: float = 0.0
     changeover_s: float = 0.0
     power_cools: bool = False
 
+    APPLIED_TOLERANCE = _APPLIED_TOLERANCE
     HOLD_S = 3.0
     """HOLD keeps the last output no longer than this."""
     RIDE_S = 60.0

@@ -135,6 +135,21 @@ class Regulator:
         self._steering.mind = self._shadow.exchanged(self._steering.mind)
         self._emit("controller.changed", before=charge, after=shadow)
 
+    # -- a loop within a loop --------------------------------------------------------------------
+
+    @property
+    def released(self) -> bool:
+        """Whether power may be given at all: neither off, nor SAFE or LATCHED, nor tripping."""
+        return self._wishes.mode is not Mode.OFF and self._supervisor.released
+
+    def lead(self, setpoint_c: float, *, released: bool) -> None:
+        """Follow another loop from now on: hold `setpoint_c`, give no power unless `released`.
+
+        Asked at every sample, before `step`; a set point from anybody else is refused then.
+        """
+        self._wishes.follow(setpoint_c)
+        self._supervisor.master_released = released
+
     # -- the walk of a sample --------------------------------------------------------------------
 
     def step(self, measurement: Measurement) -> Step:

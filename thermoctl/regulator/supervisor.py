@@ -72,6 +72,14 @@ class Supervisor:
         self._last_power = 0.0
         self._taken = 0.0  # the last command, or what the actuators made of it
         self._changeover = Changeover()
+        self.master_released = True
+        """Whether the loop above this one, if there is one, may give power itself."""
+
+    @property
+    def released(self) -> bool:
+        """Whether any power may pass: not in SAFE or LATCHED, nor while a trip is pending."""
+        sound = self.state not in (State.SAFE, State.LATCHED) and self._tripping is None
+        return sound and self.master_released
 
     @property
     def verdict(self) -> Verdict:
@@ -227,6 +235,8 @@ class Supervisor:
             power, reason = 0.0, self._why_off()
         elif self._tripping is not None:
             power, reason = 0.0, _TRIPS[self._tripping][0]
+        elif not self.master_released:
+            power, reason = 0.0, "master.off"
         elif not is_finite_number(asked):
             power, reason = 0.0, "output.nan"
         else:

@@ -29,6 +29,7 @@ class Wishes:
         self.setpoint_c = limits.accept_setpoint(setpoint_c)
         self.mode = mode
         self.manual_power = 0.0
+        self._led = False
 
     def want_mode(self, mode: Mode, given: float) -> None:
         """Go to `mode`, while the power `given` is taken; manual goes on with it."""
@@ -43,10 +44,17 @@ class Wishes:
 
     def want_setpoint(self, value_c: float) -> None:
         """Hold `value_c`, in degC."""
+        if self._led:
+            raise Refused(f"expected it of the loop that leads this one, got {value_c!r} for this")
         accepted_c = self._limits.accept_setpoint(value_c)
         if accepted_c != self.setpoint_c:
             self._emit("setpoint.changed", before_c=self.setpoint_c, after_c=accepted_c)
         self.setpoint_c = accepted_c
+
+    def follow(self, setpoint_c: float) -> None:
+        """Hold what a loop above this one asks for, at every sample anew and without an event."""
+        self._led = True
+        self.setpoint_c = self._limits.accept_setpoint(setpoint_c)
 
     def want_power(self, power: float) -> None:
         """Give `power`, a fraction of what the loop can take, in mode manual."""

@@ -19,6 +19,7 @@ from thermoctl.errors import DriverError, FaultError, LinkError, Refused
 from thermoctl.ports import Clock
 from thermoctl.regulator.limits import command_lasts_s
 from thermoctl.runtime.asked import Asked
+from thermoctl.runtime.cascade import Lead, hand_down, outer_first
 from thermoctl.runtime.connection import Connection
 from thermoctl.runtime.wiring import Output, Wiring, signed
 from thermoctl.signals import Cycle, Event, Measurement, Quality, RawSample, Request, Step
@@ -60,7 +61,8 @@ class Loop:
         publish: Publish,
         completed: Callable[[], None] = lambda: None,
     ) -> None:
-        self.wirings = tuple(wirings)
+        self.wirings = outer_first(wirings)
+        self._named = {each.name: each for each in self.wirings}
         self.boards = tuple({id(b): b for w in self.wirings for b in w.boards}.values())
         self._clock, self._period_s = clock, period_s
         self._publish, self._completed = publish, completed
@@ -149,13 +151,15 @@ class Loop:
             self.report("cycle.late", late_s=late_s)
         self._grant_requests()
         samples = {id(board): self._read(board) for board in self.boards}
+        seen = {w.name: self._measure(w, samples[id(w.sensor_board)]) for w in self.wirings}
+        led = {w.name: self._led(w, w.lead, seen) for w in self.wirings if w.lead is not None}
         walked = []
         for wiring in self.wirings:
-            measurement = self._measure(wiring, samples[id(wiring.sensor_board)])
             begin_ns = time.thread_time_ns()
-            step = wiring.regulator.step(measurement)
+            step = wiring.regulator.step(seen[wiring.name])
             walked.append((wiring, step, (time.thread_time_ns() - begin_ns) / 1000.0))
-        accepted = self._write({wiring.name: step for wiring, step, _ in walked})
+            hand_down(wiring, step.command.power, self._named)
+        accepted = self._write({wiring.name: step for wiring, step, _ in walked}) | led
         events = self.take_events()
         for wiring, step, tick_us in walked:
             self._hand_out(wiring, step, events, accepted[wiring.name], tick_us, late_s)
@@ -194,6 +198,13 @@ class Loop:
             measurement, t_s=now_s, quality=Quality.STALE if old else measurement.quality
         )
 
+    def _led(self, wiring: Wiring, lead: Lead, seen: Mapping[str, Measurement]) -> float:
+        """Return what a loop that leads another one really gave, after telling its regulator."""
+        taken = lead.taken(seen[wiring.name], seen[lead.inner])
+        if math.isfinite(taken):
+            wiring.regulator.applied(taken)
+        return taken
+
     def _write(self, steps: Mapping[str, Step]) -> dict[str, float]:
         """Give every board its drives in one exchange; return the accepted power by loop."""
         taken: dict[tuple[str, Output], float] = {}
@@ -217,7 +228,7 @@ class Loop:
                 self._fail(self._users(board), "cycle.failed", error)
             else:
                 taken |= powers
-        return {w.name: self._accepted(w, taken) for w in self.wirings}
+        return {w.name: self._accepted(w, taken) for w in self.wirings if w.outputs}
 
     def _accepted(self, wiring: Wiring, taken: Mapping[tuple[str, Output], float]) -> float:
         """Return the power that a loop's outputs took, after telling its regulator."""

@@ -10,6 +10,7 @@ from thermoctl.model.actuator import ActuatorLaw
 from thermoctl.model.sensor import Sensor
 from thermoctl.quantities import is_finite_number
 from thermoctl.regulator import Regulator
+from thermoctl.runtime.cascade import Lead
 from thermoctl.runtime.connection import Connection
 
 
@@ -40,9 +41,12 @@ class Wiring:
     sensor_board, input, sensor : Connection, str, Sensor
         Where its temperature comes from.
     actuator_board, output, law : Connection, str, ActuatorLaw
-        Where its power goes to: the heater, or a cooler that is the only actuator.
+        Where its power goes to: the heater, or a cooler that is the only actuator; no board for a
+        loop that leads another one.
     cooler : Output, optional
         Where negative power goes to.
+    lead : Lead, optional
+        What its power means to another loop, in place of an output.
     """
 
     name: str
@@ -50,16 +54,18 @@ class Wiring:
     sensor_board: Connection
     input: str
     sensor: Sensor
-    actuator_board: Connection
+    actuator_board: Connection | None
     output: str
     law: ActuatorLaw
     cooler: Output | None = None
+    lead: Lead | None = None
     outputs: tuple[Output, ...] = field(init=False, repr=False)
     """The heater, and the cooler where there is one."""
 
     def __post_init__(self) -> None:
-        heater = Output(self.actuator_board, self.output, self.law)
-        outputs = (heater,) if self.cooler is None else (heater, self.cooler)
+        board = self.actuator_board
+        heater = None if board is None else Output(board, self.output, self.law)
+        outputs = tuple(each for each in (heater, self.cooler) if each is not None)
         object.__setattr__(self, "outputs", outputs)
 
     @property
