@@ -24,6 +24,7 @@ import click
 from thermoctl import __version__
 from thermoctl.app.compose import loop_for
 from thermoctl.app.cycle_record import as_line
+from thermoctl.app.insight_watch import InsightService, insights_for
 from thermoctl.app.live import Action, Desk, Facts, Keys, LiveModel, LiveScreen, look_for
 from thermoctl.app.live.desk import DISTURBANCES
 from thermoctl.app.live.look import printable
@@ -79,8 +80,11 @@ def run_bench(settings: Settings, options: BenchOptions) -> None:
         if options.as_json:
             sinks.append(_json_lines(loop, orders, flush=math.isfinite(options.speed)))
         else:
-            view = stack.enter_context(_LiveBench.on_terminal(settings, loop, clock, options))
-            sinks.append(view.take)
+            insight = InsightService(insights_for(settings.loops), _reports(loop))
+            view = stack.enter_context(
+                _LiveBench.on_terminal(settings, loop, clock, options, insight)
+            )
+            sinks += [insight.step, view.take]
             clock.idle = view.idle
         loop.run(until_s=options.duration_s)
     _tell(summary, options)
@@ -112,10 +116,16 @@ def _orders_beside(settings: Settings, loop: Loop) -> OrderService | None:
         return None
     from thermoctl.app.order_watch import OrderService, watches_for
 
+    return OrderService(watches_for(settings.loops), _reports(loop))
+
+
+def _reports(loop: Loop) -> Callable[..., None]:
+    """Return what puts an event of somebody beside a loop among its own."""
+
     def report(name: str, of: str, **fields: object) -> None:
         loop.report(name, loop=of, **fields)
 
-    return OrderService(watches_for(settings.loops), report)
+    return report
 
 
 def _json_lines(loop: Loop, orders: OrderService | None, *, flush: bool) -> Callable[[Cycle], None]:
@@ -173,9 +183,15 @@ class _LiveBench:
     """The live view of a bench test: takes cycles, draws when the loop is idle, obeys keys."""
 
     def __init__(
-        self, loop: Loop, clock: PacedClock, model: LiveModel, screen: LiveScreen, keys: Keys
+        self,
+        loop: Loop,
+        clock: PacedClock,
+        model: LiveModel,
+        screen: LiveScreen,
+        keys: Keys,
+        insight: InsightService,
     ) -> None:
-        self._loop, self._clock = loop, clock
+        self._loop, self._clock, self._insight = loop, clock, insight
         self._model, self._screen, self._keys = model, screen, keys
         self._desk = Desk(model.facts)
         self._last: Cycle | None = None
@@ -185,7 +201,11 @@ class _LiveBench:
     @staticmethod
     @contextmanager
     def on_terminal(
-        settings: Settings, loop: Loop, clock: PacedClock, options: BenchOptions
+        settings: Settings,
+        loop: Loop,
+        clock: PacedClock,
+        options: BenchOptions,
+        insight: InsightService,
     ) -> Iterator[_LiveBench]:
         """Take the terminal over, and give it back whatever happens."""
         name, table = settings.loop()
@@ -196,11 +216,11 @@ class _LiveBench:
         )
         model = LiveModel(facts)
         with Keys(sys.stdin.fileno()) as keys, LiveScreen(model) as screen:
-            yield _LiveBench(loop, clock, model, screen, keys)
+            yield _LiveBench(loop, clock, model, screen, keys, insight)
 
     def take(self, cycle: Cycle) -> None:
         """Feed the view; at full speed this is also where it gets a turn."""
-        self._model.feed(cycle)
+        self._model.feed(cycle, self._insight.insight(cycle.loop))
         self._last = cycle
         if time.monotonic() - self._drawn_s > _DRAW_S:
             self.idle(0.0)

@@ -111,7 +111,7 @@ class Clerk:
 
     def details(self, cycle: Cycle) -> Mapping[str, Any]:
         """Return the rest of a cycle, for a client that asked for details."""
-        return details_of(cycle)
+        return details_of(cycle, self._insight(cycle.loop))
 
     # -- which loop ------------------------------------------------------------------------------
 

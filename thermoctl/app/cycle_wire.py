@@ -8,13 +8,15 @@ covariances: nobody shows them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import MISSING, asdict, fields
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import MISSING, asdict, fields, replace
 from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
 
 from thermoctl.errors import Unavailable
+from thermoctl.insight import Change, Drift, Gate, Insight, Limit, Performance, Row
 from thermoctl.signals import (
     Alarm,
     Beliefs,
@@ -25,19 +27,26 @@ from thermoctl.signals import (
     Feasible,
     Measurement,
     Mode,
-    PlantBelief,
     Quality,
     ShadowScore,
     State,
     Step,
 )
 
-T = TypeVar("T", Alarm, Event, Feasible, PlantBelief, ShadowScore)
+T = TypeVar("T", Alarm, Change, Drift, Event, Feasible, Performance, Row, ShadowScore)
 
 
-def details_of(cycle: Cycle) -> dict[str, Any]:
-    """Return what a view needs of `cycle` and its record does not hold."""
-    step, estimate, plant = cycle.step, cycle.step.estimate, cycle.step.plant
+def details_of(cycle: Cycle, insight: Insight | None = None) -> dict[str, Any]:
+    """Return what a view needs of `cycle` and its record does not hold.
+
+    Parameters
+    ----------
+    cycle : Cycle
+        The cycle.
+    insight : Insight or None
+        What is told of its plant; None where nobody looks.
+    """
+    step, estimate = cycle.step, cycle.step.estimate
     return {
         "reason": step.command.reason,
         "theta": estimate.theta,
@@ -47,7 +56,7 @@ def details_of(cycle: Cycle) -> dict[str, Any]:
         "events": [
             {"t_s": event.t_s, "name": event.name, "fields": event.fields} for event in step.events
         ],
-        "plant": None if plant is None else asdict(plant),
+        "insight": None if insight is None else insight.as_json(),
     }
 
 
@@ -59,17 +68,47 @@ def cycle_from(record: Mapping[str, Any], details: Mapping[str, Any]) -> Cycle:
     Unavailable
         They are not those of a daemon that this program understands.
     """
-    try:
+    with _understood():
         return _cycle(record, details)
+
+
+def insight_from(details: Mapping[str, Any]) -> Insight | None:
+    """Return the insight that `details` tell of; None where there is none.
+
+    Raises
+    ------
+    Unavailable
+        It is not that of a daemon that this program understands.
+    """
+    with _understood():
+        told = details["insight"]
+        return None if told is None else _insight(told)
+
+
+@contextmanager
+def _understood() -> Iterator[None]:
+    try:
+        yield
     except (KeyError, TypeError, ValueError) as error:
         text = f"expected a cycle of a daemon of the same version, and could not read {error}"
         raise Unavailable(text) from error
 
 
+def _insight(told: Mapping[str, Any]) -> Insight:
+    performance = _made(Performance, told["performance"])
+    return Insight(
+        t_s=_number(told["t_s"]),
+        gate=Gate(told["gate"]),
+        rows=tuple(_made(Row, each) for each in told["rows"]),
+        changes=tuple(_made(Change, each) for each in told["changes"]),
+        drifts=tuple(_made(Drift, each) for each in told["drifts"]),
+        performance=replace(performance, limit=Limit(performance.limit)),
+    )
+
+
 def _cycle(record: Mapping[str, Any], details: Mapping[str, Any]) -> Cycle:
     t_s = float(record["t_s"])
-    score, plant = record["shadow_score"], details["plant"]
-    believed = None if plant is None else _made(PlantBelief, plant)
+    score = record["shadow_score"]
     quality = Quality(record["quality"])
     step = Step(
         t_s=t_s,
@@ -89,7 +128,6 @@ def _cycle(record: Mapping[str, Any], details: Mapping[str, Any]) -> Cycle:
         shadow_power=_maybe(record["shadow_power"]),
         shadow_score=None if score is None else _made(ShadowScore, score),
         feasible=_made(Feasible, record["feasible"]),
-        tell=lambda: believed,
     )
     accepted, tick_us = _number(record["accepted_power"]), _number(record["tick_us"])
     return Cycle(str(record["loop"]), step, accepted, tick_us, _number(record["late_s"]))

@@ -14,8 +14,9 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Final
 
-from thermoctl.app.cycle_wire import cycle_from
+from thermoctl.app.cycle_wire import cycle_from, insight_from
 from thermoctl.errors import Refused, ThermoctlError, Unavailable
+from thermoctl.insight import Insight
 from thermoctl.services.control_client import ANSWER_S, ControlClient
 from thermoctl.signals import Acknowledge, ChooseController, Cycle, Mode, Request, SetPoint
 
@@ -23,6 +24,14 @@ RETRY_S: Final = 1.0
 """Pause before a daemon that has gone is asked again."""
 
 _WAIT_S: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A finished cycle, and what is told of the plant after it."""
+
+    cycle: Cycle
+    insight: Insight | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +151,7 @@ class DaemonLine:
 
     def __init__(self, socket: Path | None, met: Met) -> None:
         self._socket, self._met = socket, met
-        self._heard: SimpleQueue[Cycle | Gone | Denied] = SimpleQueue()
+        self._heard: SimpleQueue[Heard | Gone | Denied] = SimpleQueue()
         self._asked: SimpleQueue[Request | None] = SimpleQueue()
         self._closing = threading.Event()
 
@@ -156,7 +165,7 @@ class DaemonLine:
         self._closing.set()
         self._asked.put(None)
 
-    def take(self) -> list[Cycle | Gone | Denied]:
+    def take(self) -> list[Heard | Gone | Denied]:
         """Return what has come since the last call, the oldest first."""
         return _drained(self._heard)
 
@@ -169,7 +178,7 @@ class DaemonLine:
             try:
                 with ControlClient(self._socket) as client:
                     for record, details in client.follow(self._met.loop):
-                        self._heard.put(cycle_from(record, details))
+                        self._heard.put(Heard(cycle_from(record, details), insight_from(details)))
             except ThermoctlError as error:
                 self._heard.put(Gone(str(error)))
             self._closing.wait(RETRY_S)

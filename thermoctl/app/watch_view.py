@@ -9,9 +9,9 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Final
 
-from thermoctl.app.daemon_line import DaemonLine, Denied, Gone, Met
+from thermoctl.app.daemon_line import DaemonLine, Denied, Gone, Heard, Met
 from thermoctl.app.live import Action, Desk, Facts, Keys, LiveModel, LiveScreen
-from thermoctl.signals import Cycle, Step
+from thermoctl.signals import Step
 
 _TURN_S: Final = 0.05
 
@@ -76,9 +76,9 @@ class WatchView:
         """Take what has come and obey `actions`; return whether to go on."""
         for heard in self._line.take():
             match heard:
-                case Cycle():
-                    self._model.feed(heard)
-                    self._step, self.lost = heard.step, ""
+                case Heard(cycle, insight):
+                    self._model.feed(cycle, insight)
+                    self._step, self.lost = cycle.step, ""
                 case Gone(why):
                     self.lost = why
                 case Denied(why):

@@ -2,26 +2,28 @@
 
 import json
 import tomllib
-from dataclasses import asdict
+from dataclasses import replace
 from datetime import datetime
 
 import pytest
 
 from thermoctl.app.cycle_record import cycle_record
-from thermoctl.app.cycle_wire import cycle_from, details_of
+from thermoctl.app.cycle_wire import cycle_from, details_of, insight_from
 from thermoctl.app.live import Colour, Facts, LiveModel, Look, render
 from thermoctl.app.settings import load
 from thermoctl.app.sim import bench_settings, default_profile, simulate
 from thermoctl.errors import Unavailable
+from thermoctl.insight import Change, Drift, Insight, Insights
 from thermoctl.services.control_protocol import told
 
 ZERO = datetime(2026, 3, 1, 14, 0)
 
 
-def sent(cycle):
-    """Return `cycle` as it arrives at the other end."""
-    line = json.loads(told(1, cycle_record(cycle), details_of(cycle)))
-    return cycle_from(line["cycle"], line["details"])
+def sent(cycle, insight=None):
+    """Return `cycle` as it arrives at the other end, and its insight where one is sent."""
+    line = json.loads(told(1, cycle_record(cycle), details_of(cycle, insight)))
+    arrived = cycle_from(line["cycle"], line["details"])
+    return arrived if insight is None else (arrived, insight_from(line["details"]))
 
 
 @pytest.fixture(scope="module")
@@ -59,9 +61,20 @@ def test_a_latch_and_its_events_travel_too(latched):
     assert picture(arrived) == picture(latched)
 
 
-def test_what_is_believed_of_the_plant_arrives(run):
+def test_what_is_told_of_the_plant_arrives_whole(run):
+    watch = Insights(1.0, 1500.0)
+    for each in run:
+        watch.after(each.step, each.accepted_power)
+    drift = Drift("water.low", 3.0, "less water", 1.0, 2.0, 5.0)
+    change = Change(5.0, "step.loss", -3.1, 0.2, "K", "cold water", None)
+    for insight in (replace(watch.now, drifts=(drift,), changes=(change,)), Insight(0.0)):
+        assert sent(run[-1], insight)[1] == insight
+    assert watch.now.rows
+    assert insight_from(details_of(run[-1])) is None
+
+
+def test_scores_and_expectations_arrive(run):
     last = run[-1].step
-    assert asdict(sent(run[-1]).step.plant) == asdict(last.plant)
     assert sent(run[-1]).step.shadow_score == last.shadow_score
     assert sent(run[-1]).step.feasible == last.feasible
     assert last.feasible.holding_power > 0.1
@@ -69,8 +82,9 @@ def test_what_is_believed_of_the_plant_arrives(run):
 
 def test_keys_of_a_newer_daemon_are_passed_over(run):
     record, details = cycle_record(run[-1]), details_of(run[-1])
-    details["plant"]["colour"], record["colour"], details["colour"] = "blue", 1, None
-    assert cycle_from(record, details).step.plant == run[-1].step.plant
+    record["shadow_score"] = {**record["shadow_score"], "colour": "blue"}
+    record["colour"], details["colour"] = 1, None
+    assert cycle_from(record, details).step.shadow_score == run[-1].step.shadow_score
 
 
 @pytest.mark.parametrize("spoil", [{"mode": "lazy"}, {"setpoint_c": "warm"}, {"t_s": None}])

@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 
 import pytest
 
-from thermoctl.app.daemon_line import Denied, Gone, Met, call_for, most_urgent
+from thermoctl.app.daemon_line import Denied, Gone, Heard, Met, call_for, most_urgent
 from thermoctl.app.live import Action, LiveModel
 from thermoctl.app.sim import bench_settings, simulate
 from thermoctl.app.watch_view import WatchView, facts_of
@@ -32,8 +32,8 @@ class Line:
 
 @pytest.fixture(scope="module")
 def cycle():
-    """A cycle of a loop at 37.5 degC in auto, with a shadow."""
-    return list(simulate(bench_settings(seed=1), 5.0))[-1]
+    """What is heard of a loop at 37.5 degC in auto, with a shadow."""
+    return Heard(list(simulate(bench_settings(seed=1), 5.0))[-1], None)
 
 
 @pytest.fixture

@@ -180,14 +180,24 @@ def inflation(bench: Bench) -> Item:
 _LOSSES = (("loss_w_per_k", 1), ("loss_w", 0), ("loss", 2))
 """Ways to say the loss, the best first, with their decimals."""
 
+_SURE = 0.2
+"""W/K is said once its error is no larger a share of it: it takes several set points to know."""
+
 
 def loss(bench: Bench) -> Item:
     """Return what the plant loses, in watts where the heater's are known."""
     for name, decimals in _LOSSES:
         row = told(bench.view.insight, name)
-        if row is not None:
+        vague = name == "loss_w_per_k" and row is not None and not _is_sure(row)
+        if row is not None and not vague:
             return _item(bench, row, "Loss", decimals, trend.LOSS)
     return _unknown("Loss", "Loss", "not known yet")
+
+
+def _is_sure(row: Row) -> bool:
+    if row.value is None or row.error is None:
+        return False
+    return row.error <= _SURE * abs(row.value)
 
 
 def lag(bench: Bench) -> Item:

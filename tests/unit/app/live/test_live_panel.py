@@ -75,6 +75,9 @@ def test_a_loss_is_told_in_watts_per_kelvin_as_soon_as_that_is_known(
     better = Row("loss_w_per_k", "loss", 7.62, 0.2, "W/K", "7.6 ± 0.2 W/K")
     rows = spaced(fed(model, make_cycle(0.0), replace(INSIGHT, rows=(*ROWS, better))))
     assert any(row.startswith("Loss 7.6 ± 0.2 W/K") for row in rows)
+    vague = replace(INSIGHT, rows=(*ROWS, replace(better, error=5.6)))
+    rows = spaced(fed(model, make_cycle(0.0), vague))
+    assert any(row.startswith("Loss 0.46 ± 0.05 K/min") for row in rows)
 
 
 def test_more_rows_have_water_and_noise_and_say_what_is_missing(
