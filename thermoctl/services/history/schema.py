@@ -162,7 +162,7 @@ INSERT_CLOCK_STEP: Final = (
 
 
 def migration(version: int) -> list[str]:
-    """Return the statements that make a file of schema `version` one of `SCHEMA_VERSION`."""
+    """Return the statements that bring a file of schema `version` up to date."""
     missing = [column for column in COLUMNS if column.since > version]
     added = [f"ALTER TABLE cycles ADD COLUMN {each.name} {each.kind}" for each in missing]
     return [*added, f"PRAGMA user_version = {SCHEMA_VERSION}"]
