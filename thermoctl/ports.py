@@ -142,7 +142,7 @@ class Situation:
     temperature_c : float
         This sample, or the model's prediction of it while the supervisor rides; NaN: not known.
     setpoint_c : float
-        What to hold.
+        What to follow now: the set point, or where its ramp is.
     applied : float
         Power the actuator took during the interval that has just ended.
     estimate : Estimate
@@ -152,6 +152,10 @@ class Situation:
         ``u_past[0]`` is `applied`. As many as the structure of the model needs.
     measured_c : float
         This reading; NaN when there is none, or none to be believed.
+    setpoint_rate_k_per_s : float
+        How fast `setpoint_c` moves, with its sign; 0 at the end of a ramp.
+    target_c : float
+        Where the ramp ends; NaN where nobody said.
     """
 
     t_s: float
@@ -163,6 +167,8 @@ class Situation:
     y_past_c: Array
     u_past: Array
     measured_c: float = math.nan
+    setpoint_rate_k_per_s: float = 0.0
+    target_c: float = math.nan
 
 
 class Controller(Protocol):

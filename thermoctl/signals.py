@@ -79,9 +79,14 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class SetPoint:
-    """Request: hold `value_c`."""
+    """Request: hold `value_c`, in degC.
+
+    `rate_k_per_min` is how fast to go there, in K/min; None: as fast as is configured. It holds
+    for this request.
+    """
 
     value_c: float
+    rate_k_per_min: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +198,7 @@ class PlantBelief:
 
 @dataclass(frozen=True, slots=True)
 class Feasible:
-    """What can be said of the set point before it is reached; NaN where that is not known.
+    """What is said of a set point before it is reached; NaN where not known.
 
     Reckoned every ten seconds or so, from a balance of heat that is kept beside every controller.
 
@@ -315,6 +320,8 @@ def _no_models() -> Mapping[str, Mapping[str, Any]]:
 class Step:
     """Everything the regulator made of one measurement.
 
+    `setpoint_c` is the set point in force, `reference_c` what is followed now: the same, or where
+    the ramp to it is.
     `shadow` is the name of the controller that is asked beside `controller`, `shadow_power` what it
     would have given, within the limit of power; None where there is none, or no answer. `origin`
     says what the model of the one in charge began with: ``new`` with nothing, ``trial`` or
@@ -338,6 +345,7 @@ class Step:
     shadow_power: float | None = None
     shadow_score: ShadowScore | None = None
     feasible: Feasible = field(default_factory=Feasible)
+    reference_c: float = math.nan
     tell: Callable[[], PlantBelief | None] = field(default=_nothing, repr=False)
     origin: str | None = None
     remember: Callable[[], Mapping[str, Mapping[str, Any]]] = field(default=_no_models, repr=False)

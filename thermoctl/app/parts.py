@@ -61,7 +61,15 @@ def plan_for(table: LoopTable) -> Plan:
         _check_action(table, name, law, controller)
     with _within("", table):
         limits = _limits(table, controller)
-        return Plan(limits, identifier, controller, table.setpoint_c, table.mode, shadow)
+        return Plan(
+            limits,
+            identifier,
+            controller,
+            table.setpoint_c,
+            table.mode,
+            shadow,
+            table.setpoint_rate_k_per_s,
+        )
 
 
 def check_parts(table: LoopTable) -> None:

@@ -226,6 +226,11 @@ class LoopTable(Table):
     setpoint_max_c: Celsius | None = Field(
         None, description="Highest set point; the trip if absent."
     )
+    setpoint_rate_k_per_min: Positive | None = Field(
+        None,
+        description="How fast a set point is approached, at most; when absent at once. It begins "
+        "where the plant is.",
+    )
     period_s: Annotated[float, Field(ge=0.05, le=3600.0)] = Field(
         1.0, description="Time between two samples."
     )
@@ -320,6 +325,12 @@ class LoopTable(Table):
         low_c = self.trip_below_c if self.setpoint_min_c is None else self.setpoint_min_c
         high_c = self.trip_above_c if self.setpoint_max_c is None else self.setpoint_max_c
         return low_c, high_c
+
+    @property
+    def setpoint_rate_k_per_s(self) -> float:
+        """How fast a set point is approached, at most; infinite when not limited."""
+        rate_k_per_min = self.setpoint_rate_k_per_min
+        return math.inf if rate_k_per_min is None else rate_k_per_min / 60.0
 
     @property
     def rise_limit_per_s(self) -> float:

@@ -60,15 +60,19 @@ class Gathered(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What is to be held: a set point in degC, with at most `power_max`, in `mode`."""
+    """What is to be held, in `mode`: a set point in degC, with at most `power_max`.
+
+    `ramp_s` is how long the reference is still on its way there.
+    """
 
     setpoint_c: float
     power_max: float
     mode: Mode
+    ramp_s: float = 0.0
 
 
 class Feasibility:
-    """Keeps the balance of heat of a loop, and says when its set point is out of reach.
+    """Keeps the balance of heat of a loop; says when a set point is out of reach.
 
     Parameters
     ----------
@@ -189,7 +193,9 @@ class Feasibility:
         rest = Known(rest_s, LAG_DOUBT * (rest_s + lag_s))
         if abs(setpoint_c - coasting_c) <= ARRIVED_K:
             return rest
-        return heat_loss.arrival(belief, coasting_c, setpoint_c, power, rest)
+        arrival = heat_loss.arrival(belief, coasting_c, setpoint_c, power, rest)
+        slower = wanted.ramp_s > arrival.mean
+        return Known(wanted.ramp_s, LAG_DOUBT * lag_s) if slower else arrival
 
     def _tell(self, belief: HeatBelief, wanted: Wanted, t_s: float) -> None:
         """Raise the alarm, or clear it; slower to end than to begin."""

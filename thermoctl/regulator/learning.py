@@ -9,6 +9,7 @@ from thermoctl.ports import Situation
 from thermoctl.quantities import Array
 from thermoctl.regulator.guard import Guard
 from thermoctl.regulator.holding import Holding
+from thermoctl.regulator.reference import Reference
 from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import Beliefs, Estimate
 
@@ -69,7 +70,12 @@ class Learning:
         self._holding = self._holding.after(deviation_k, applied, seen_s)
 
     def situation(
-        self, t_s: float, interval_s: float, measured_c: float, setpoint_c: float, applied: float
+        self,
+        t_s: float,
+        interval_s: float,
+        measured_c: float,
+        reference: Reference,
+        applied: float,
     ) -> Situation:
         """Return what controllers may know of this sample."""
         known = self._belief if self._foreseen is None else self._foreseen
@@ -77,12 +83,14 @@ class Learning:
             t_s,
             interval_s,
             float(known.y_past_c[0]),
-            setpoint_c,
+            reference.value_c,
             applied,
             known.estimate,
             known.y_past_c,
             known.u_past,
             measured_c,
+            reference.rate_k_per_s,
+            reference.target_c,
         )
 
     def beliefs(self, t_s: float) -> Beliefs:

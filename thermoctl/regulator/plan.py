@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from thermoctl.estimation.identifier import Identifier
@@ -28,12 +29,14 @@ class Plan:
         Mode at the start.
     shadow : Controller, optional
         Another law, asked beside the one in charge and not obeyed until it is put in charge.
+    setpoint_rate_k_per_s : float
+        How fast a set point is approached, at most; infinite: at once.
 
     Raises
     ------
     ValueError
         The mode is PROGRAM: there is none to begin with. Or both laws have one name: nobody could
-        choose between them.
+        choose between them. Or the rate is not positive.
     """
 
     limits: Limits
@@ -42,10 +45,15 @@ class Plan:
     setpoint_c: float
     mode: Mode = Mode.OFF
     shadow: Controller | None = None
+    setpoint_rate_k_per_s: float = math.inf
 
     def __post_init__(self) -> None:
         if self.mode is Mode.PROGRAM:
             raise ValueError("mode must be off, manual or auto at the start, got 'program'")
+        if not self.setpoint_rate_k_per_s > 0.0:
+            raise ValueError(
+                f"setpoint_rate_k_per_s must be positive, got {self.setpoint_rate_k_per_s!r}"
+            )
         if self.shadow is not None and self.shadow.name == self.controller.name:
             raise ValueError(
                 f"shadow must be another kind than the controller's, got {self.shadow.name!r} twice"

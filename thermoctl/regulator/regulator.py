@@ -65,7 +65,8 @@ class Regulator:
         self.plan = plan
         self._limits = plan.limits
         self._events: list[tuple[str, dict[str, object]]] = []
-        self._wishes = Wishes(plan.limits, plan.setpoint_c, plan.mode, self._emit)
+        rate_k_per_s = plan.setpoint_rate_k_per_s
+        self._wishes = Wishes(plan.limits, plan.setpoint_c, plan.mode, self._emit, rate_k_per_s)
         self._supervisor = Supervisor(plan.limits, self._emit)
         self._guard = Guard(self._supervisor)
         self._steering = Steering(Mind(plan.controller), self._guard, self._emit)
@@ -106,8 +107,8 @@ class Regulator:
         match request:
             case Mode():
                 self._wishes.want_mode(request, self._applied_power())
-            case SetPoint(value_c):
-                self._wishes.want_setpoint(value_c)
+            case SetPoint(value_c, rate_k_per_min):
+                self._wishes.want_setpoint(value_c, rate_k_per_min)
             case ManualPower(power):
                 self._wishes.want_power(power)
             case ChooseController(name):
@@ -159,9 +160,10 @@ class Regulator:
         verdict = self._supervisor.judge(measurement, t_s, interval_s, self._jump_k)
         temperature_c = float(measurement.temperature_c) if verdict is Verdict.GOOD else math.nan
         self._learning.observe(temperature_c, self._given(applied, interval_s), t_s)
-        seen_s, setpoint_c = self._limits.seen_s(interval_s), self._wishes.setpoint_c
-        self._learning.hold(temperature_c - setpoint_c, applied, seen_s)
-        situation = self._learning.situation(t_s, interval_s, temperature_c, setpoint_c, applied)
+        seen_s = self._limits.seen_s(interval_s)
+        self._learning.hold(temperature_c - self._wishes.setpoint_c, applied, seen_s)
+        reference = self._wishes.approach(temperature_c, seen_s, self._supervisor.state)
+        situation = self._learning.situation(t_s, interval_s, temperature_c, reference, applied)
         self._shadow.observe(situation, self._steering.mind)
         self._steering.observe(situation)
         beliefs = self._steering.beliefs(situation, self._learning.beliefs(t_s))
@@ -231,7 +233,7 @@ class Regulator:
 
     def _wanted(self) -> Wanted:
         wishes = self._wishes
-        return Wanted(wishes.setpoint_c, self._limits.power_max, wishes.mode)
+        return Wanted(wishes.setpoint_c, self._limits.power_max, wishes.mode, wishes.ramp_s)
 
     def _jump_for(self, beliefs: Beliefs) -> float:
         """Return how far the next reading may lie off before it is an outlier."""
@@ -289,6 +291,7 @@ class Regulator:
             mode=self._wishes.mode,
             state=self._supervisor.state,
             setpoint_c=self._wishes.setpoint_c,
+            reference_c=situation.setpoint_c,
             command=self._command,
             controller=self._steering.name,
             estimate=self._learning.estimate,

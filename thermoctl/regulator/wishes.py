@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 from thermoctl.errors import Refused
 from thermoctl.regulator.limits import Limits
+from thermoctl.regulator.reference import Reference, accept_rate, pace_in
 from thermoctl.regulator.supervisor import Emit
-from thermoctl.signals import Mode
+from thermoctl.signals import Mode, State
 
 
 class Wishes:
@@ -21,11 +24,22 @@ class Wishes:
         Mode at the start.
     emit : callable
         Called as ``emit(name, **fields)`` for every change.
+    most_k_per_s : float
+        How fast a set point is approached, at most; infinite: at once.
     """
 
-    def __init__(self, limits: Limits, setpoint_c: float, mode: Mode, emit: Emit) -> None:
+    def __init__(
+        self,
+        limits: Limits,
+        setpoint_c: float,
+        mode: Mode,
+        emit: Emit,
+        most_k_per_s: float = math.inf,
+    ) -> None:
         self._limits = limits
         self._emit = emit
+        self._most_k_per_s = self.rate_k_per_s = most_k_per_s
+        self.reference = Reference()
         self.setpoint_c = limits.accept_setpoint(setpoint_c)
         self.mode = mode
         self.manual_power = 0.0
@@ -42,14 +56,32 @@ class Wishes:
         self._emit("mode.changed", before=self.mode.value, after=mode.value)
         self.mode = mode
 
-    def want_setpoint(self, value_c: float) -> None:
-        """Hold `value_c`, in degC."""
+    def want_setpoint(self, value_c: float, rate_k_per_min: float | None = None) -> None:
+        """Hold `value_c`, in degC, and go there no faster than asked for or configured."""
         if self._led:
             raise Refused(f"expected it of the loop that leads this one, got {value_c!r} for this")
         accepted_c = self._limits.accept_setpoint(value_c)
+        rate_k_per_s = accept_rate(rate_k_per_min, self._most_k_per_s)
         if accepted_c != self.setpoint_c:
-            self._emit("setpoint.changed", before_c=self.setpoint_c, after_c=accepted_c)
-        self.setpoint_c = accepted_c
+            ramp = {} if rate_k_per_min is None else {"rate_k_per_min": rate_k_per_min}
+            self._emit("setpoint.changed", before_c=self.setpoint_c, after_c=accepted_c, **ramp)
+        self.setpoint_c, self.rate_k_per_s = accepted_c, rate_k_per_s
+        self.reference = self.reference.anew()
+
+    @property
+    def ramp_s(self) -> float:
+        """How long the reference will still be on its way; 0 where nothing limits it."""
+        if math.isinf(self.rate_k_per_s) or math.isnan(self.reference.value_c):
+            return 0.0
+        return abs(self.setpoint_c - self.reference.value_c) / self.rate_k_per_s
+
+    def approach(self, measured_c: float, seen_s: float, state: State) -> Reference:
+        """Return what is followed at this sample, on the way to the set point."""
+        pace = pace_in(self.mode, state)
+        self.reference = self.reference.after(
+            self.setpoint_c, self.rate_k_per_s, measured_c, seen_s, pace
+        )
+        return self.reference
 
     def follow(self, setpoint_c: float) -> None:
         """Hold what a loop above this one asks for, at every sample anew and without an event."""

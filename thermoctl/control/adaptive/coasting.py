@@ -9,6 +9,15 @@ All heat that is still under way is in :math:`T_\infty`, taken from the power th
 there is nothing to wind up, full power lasts until the last moment, and whoever steered before, the
 law goes on without a bump.
 
+On a ramp :math:`r + \rho t` the power to rest with is :math:`u_{ss} + \rho/\beta` instead: with it
+from now on the water comes to lie on the line :math:`T_\infty - \rho\,\tau + \rho t`, where
+:math:`\tau = t_1 + h n_d` is the lag ahead of the water, and that line shall be the ramp. Hence
+
+.. math:: u = u_{ss} + \frac{\rho}{\beta} + \frac{r + \rho\,\tau - T_\infty}{\beta\, T_c},
+
+which is the law above for where the ramp will be when the heat of now arrives. The sensor's lag has
+no part in it, for the filters see through it.
+
 Implements section 9 of ``docs/theory.md``.
 """
 
@@ -80,8 +89,22 @@ def power_for(
     calmness: float,
     period_s: float,
     bounds: tuple[float, float],
+    ramp_power: float = 0.0,
 ) -> float:
-    """Return the power that lets the water come to rest at the set point within Tc."""
+    """Return the power that lets the water come to rest at the set point within Tc.
+
+    On a ramp, `ramp_power` is what lets the water rise with it, and the set point that of `ahead`.
+    """
     Tc_s = max(FASTEST_S, FASTEST_PERIODS * period_s, calmness * outlook.lag_s)
     error_k = setpoint_c - outlook.coasting_c
-    return clamp(outlook.holding_power + error_k / (outlook.gain * Tc_s), *bounds)
+    return clamp(outlook.holding_power + ramp_power + error_k / (outlook.gain * Tc_s), *bounds)
+
+
+def ahead(
+    setpoint_c: float, rate_k_per_s: float, end_c: float, lead_s: float
+) -> tuple[float, float]:
+    """Return where a ramp to `end_c` will be in `lead_s`, and how fast it moves then."""
+    there_c = setpoint_c + rate_k_per_s * lead_s
+    if (end_c - there_c) * rate_k_per_s <= 0.0:
+        return end_c, 0.0
+    return there_c, rate_k_per_s

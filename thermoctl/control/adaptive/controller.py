@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Literal
 
 from thermoctl.control.adaptive import trial
 from thermoctl.control.adaptive.bank import Bank, BankBelief
-from thermoctl.control.adaptive.coasting import Outlook, power_for
+from thermoctl.control.adaptive.coasting import Outlook, ahead, power_for
 from thermoctl.control.adaptive.filters import GAIN_MIN, T, X, Z
 from thermoctl.control.adaptive.plant_belief import (
     gain,
@@ -181,9 +181,13 @@ class Adaptive:
         outlook, setpoint_c = belief.bank.outlook, situation.setpoint_c
         if outlook is None or not math.isfinite(setpoint_c):
             return belief, math.nan
-        bounds = self.bank.bounds
-        r_c = self._sign * setpoint_c
-        heat = power_for(outlook, r_c, self.calmness, self.period_s, bounds)
+        bounds, r_c, ramp_heat = self.bank.bounds, self._sign * setpoint_c, 0.0
+        if situation.setpoint_rate_k_per_s != 0.0:
+            rate = self._sign * situation.setpoint_rate_k_per_s
+            end_c = self._sign * situation.target_c
+            r_c, rate = ahead(r_c, rate, end_c, self.bank.lead_s(belief.bank))
+            ramp_heat = rate / outlook.gain
+        heat = power_for(outlook, r_c, self.calmness, self.period_s, bounds, ramp_heat)
         return belief, self._power(heat)
 
     def surprise_k(self, belief: AdaptiveBelief, situation: Situation) -> float:
