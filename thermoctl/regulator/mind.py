@@ -23,12 +23,13 @@ class Mind:
         self.controller = controller
         self.belief: Any = controller.start()
         self._foretells = controller if isinstance(controller, Foretelling) else None
+        self.remembers = controller if isinstance(controller, Remembering) else None
 
     def recall(self, remembered: Remembered) -> bool:
         """Begin with what an earlier run has learnt; return whether the law can."""
-        if not isinstance(self.controller, Remembering):
+        if self.remembers is None:
             return False
-        self.belief = self.controller.start_from(remembered.model, remembered.age_s)
+        self.belief = self.remembers.start_from(remembered.model, remembered.age_s)
         return True
 
     @property

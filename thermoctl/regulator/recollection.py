@@ -37,22 +37,27 @@ def recall(minds: Iterable[Mind | None], remembered: Mapping[str, Remembered], e
 
 def origin(mind: Mind) -> str | None:
     """Return what the model of `mind` began with; None of a law that remembers nothing."""
-    law = mind.controller
-    told = attempt(partial(law.origin, mind.belief)) if isinstance(law, Remembering) else None
+    if mind.remembers is None:
+        return None
+    told = attempt(partial(mind.remembers.origin, mind.belief))
     return told if isinstance(told, str) else None
 
 
 def remembering(minds: Iterable[Mind | None]) -> Callable[[], Models]:
     """Return a function that says what `minds` would like to be kept, as they are now."""
-    held = [(mind.controller, mind.belief) for mind in minds if mind is not None]
+    held = [
+        (mind.name, mind.remembers, mind.belief)
+        for mind in minds
+        if mind is not None and mind.remembers is not None
+    ]
     return partial(_remembered, held)
 
 
-def _remembered(held: Iterable[tuple[Any, Any]]) -> Models:
+def _remembered(held: Iterable[tuple[str, Remembering, Any]]) -> Models:
     """Return what each law makes of its belief; nothing of one that fails."""
     models: dict[str, Mapping[str, Any]] = {}
-    for law, belief in held:
-        told = attempt(partial(law.remember, belief)) if isinstance(law, Remembering) else None
+    for name, law, belief in held:
+        told = attempt(partial(law.remember, belief))
         if told is not None and not isinstance(told, Failure):
-            models[law.name] = told
+            models[name] = told
     return models
