@@ -1,6 +1,6 @@
 """Self-tuning generalized predictive control, Clarke, Mohtadi and Tuffs (1987).
 
-Implements section 11 of ``docs/theory.md``.
+Implements section 10 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
@@ -93,8 +93,8 @@ class SelfTuningGpc:
     move_weight : float
         lambda over the square of what full power does in a block; more is calmer; from 0 to 1e6.
     gain_k_per_s : float
-        First guess of what full power does, in K/s, as in the loop's model; a hundredth or a
-        hundred times as much will do.
+        First guess of what full power does, in K/s; that of the loop's model. A twentieth of the
+        truth or twenty times as much will do.
     power_max : float
         Most power it plans with, in (0, 1]; that of the loop.
     period_s : float
@@ -143,7 +143,9 @@ class SelfTuningGpc:
         size = max(1, round(self.model_period_s / self.period_s))
         if size > SAMPLES_MAX:
             most_s = SAMPLES_MAX * self.period_s
-            raise ValueError(f"model_period_s must be at most {most_s:g}, got {size}")
+            raise ValueError(
+                f"model_period_s must be at most {most_s:g}, got {self.model_period_s!r}"
+            )
         self._check_horizon(model)
         block_s = size * self.period_s
         learner = Learner(model, self.gain_k_per_s * block_s, size, block_s)

@@ -4,7 +4,7 @@ A model that is kept to gains above 0 cannot say that power cools, and its least
 full power for as long as it is too cold. So a plant whose heater is dead, or whose sensor hangs in
 the air, is told by what it does: it goes on falling under full power.
 
-Implements section 11 of ``docs/theory.md``.
+Implements section 10 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ The gate g is 1 for the loss, and for everything else as large as the power is e
 readings are noise on noise, and would teach a's that oscillate and b's of nothing. In this form,
 Joseph's, P stays a covariance for any K.
 
-Implements section 11 of ``docs/theory.md``.
+Implements section 10 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ class Learner:
         return self._first
 
     def passed(self, belief: Learnt, power: float) -> Learnt:
-        """Return the belief after a block that ended with a gap, of which nothing is learnt."""
+        """Return the belief after a sample with a gap in its past: nothing is learnt."""
         return self._moved_on(belief, power)
 
     def update(self, belief: Learnt, change_k: float, phi: Array, power: float) -> Learnt:

@@ -8,7 +8,7 @@ r"""An ARX model of changes: one pole of the plant at 1, and a loss that is lear
 y are mean temperatures of blocks and u mean powers. Of the n poles of the plant one is 1: water
 keeps its heat over the horizon of a controller, and what it loses is the offset :math:`\ell`.
 
-Implements section 11 of ``docs/theory.md``.
+Implements section 10 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

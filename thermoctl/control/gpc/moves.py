@@ -7,7 +7,7 @@ r"""The powers that cost least over a horizon, within their bounds.
 Its minimum under bounds is found exactly, by an active set: with a handful of moves that is a few
 small systems of equations, and with none at a bound a single one.
 
-Implements section 11 of ``docs/theory.md``.
+Implements section 10 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

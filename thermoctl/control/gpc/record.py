@@ -4,7 +4,7 @@ The model counts in blocks of `size` samples. Its blocks are not laid out once: 
 the newest sample, and slide along with it. So the model is as valid at any sample as it is at
 every tenth, and nothing has to be held in between.
 
-Implements section 11 of ``docs/theory.md``.
+Implements section 10 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
