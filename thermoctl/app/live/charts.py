@@ -109,17 +109,21 @@ def _changes(chart: Frame, grid: Grid, *, named: bool) -> None:
         at = chart.cell_at(event.t_s)
         if event.mark is not Mark.CHANGE or not 0 <= at < chart.cells:
             continue
-        words = f"{numbers.wall_time(zero, event.t_s, '%H:%M')} {event.text}"
-        for row in range(grid.rows - 1, -1, -1) if named else ():
-            for begin in (at + 2, at - 1 - len(words)):
-                if grid.free(row, begin - 1, begin + len(words)):
-                    grid.put(row, begin, words.replace(" ", numbers.NBSP), Role.BLUE)
-                    break
-            else:
-                continue
-            break
+        when = numbers.wall_time(zero, event.t_s, "%H:%M")
+        if named and not _named(grid, at, f"{when} {event.text}"):
+            _named(grid, at, f"{when} {event.text.partition(',')[0]}")
         for row in range(grid.rows):
             grid.put(row, at, "┊", Role.BLUE)
+
+
+def _named(grid: Grid, at: int, words: str) -> bool:
+    """Write `words` beside column `at` where there is room for all of them; return if so."""
+    for row in range(grid.rows - 1, -1, -1):
+        for begin in (at + 2, at - 1 - len(words)):
+            if grid.free(row, begin - 1, begin + len(words)):
+                grid.put(row, begin, words.replace(" ", numbers.NBSP), Role.BLUE)
+                return True
+    return False
 
 
 def _unknown_end(chart: Frame, grid: Grid) -> None:

@@ -70,8 +70,11 @@ class Bench:
         middle = 0.5 * (float(known.min()) + float(known.max()))
         half = max(0.5 * float(np.ptp(known)), 0.5 * least, 1e-12 + 1e-6 * abs(middle))
         level = braille.heights(values, middle - half, middle + half, _DOTS)
-        dots = braille.envelope(*braille.joined(level, level), _DOTS)
-        return braille.cells(dots, utf8=self.look.utf8)[0]
+        return self.drawn(braille.envelope(*braille.joined(level, level), _DOTS))
+
+    def drawn(self, dots: braille.Dots) -> str:
+        """Return `dots`, one cell high; nothing without braille, where they would say nothing."""
+        return braille.cells(dots, utf8=True)[0] if self.look.utf8 else ""
 
     def columns(self) -> Array:
         """Return the run as dot columns of a spark."""
@@ -158,7 +161,7 @@ def innovation(bench: Bench) -> Item:
     level = braille.heights(
         np.clip(shown, -_SPARK_SIGMAS, _SPARK_SIGMAS), -_SPARK_SIGMAS, _SPARK_SIGMAS, _DOTS
     )
-    spark = braille.cells(braille.envelope(level, level, _DOTS), utf8=bench.look.utf8)[0]
+    spark = bench.drawn(braille.envelope(level, level, _DOTS))
     return Item(label, short, digits, "", "σ", spark, Role.BLUE)
 
 
@@ -169,8 +172,7 @@ def inflation(bench: Bench) -> Item:
         return _unknown(label, short, bench.no_belief())
     bars = np.log10(np.clip(bench.columns()[trend.INFLATION_HIGH], 1.0, 10.0))
     level = np.ceil((_DOTS - 1.0) * bars - 1e-9)
-    dots = braille.envelope(np.zeros_like(level), level, _DOTS)
-    spark = braille.cells(dots, utf8=bench.look.utf8, mark="#")[0]
+    spark = bench.drawn(braille.envelope(np.zeros_like(level), level, _DOTS))
     return Item(label, short, numbers.number(step.estimate.inflation, 2), "", "", spark, Role.BLUE)
 
 

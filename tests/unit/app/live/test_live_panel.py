@@ -254,6 +254,23 @@ def test_a_change_of_the_plant_is_drawn_where_it_began(
     assert any(row.startswith("14:00:30  ◆ Step loss") for row in rows)
 
 
+def test_a_change_with_little_room_beside_it_is_named_by_its_first_words(
+    model: LiveModel, make_cycle: MakeCycle
+) -> None:
+    fed(model, make_cycle(0.0), INSIGHT)
+    text = "step loss of 3.1 ± 0.2 K, 106 kJ, about 1.0 kg of water of 10 °C or 0.2 kg of ice"
+    model.note(Event(50.0, "plant.changed", {"text": text}))
+    rows = texts(model.view(59.0), 80, 24)[3:7]
+    assert any("14:00 Step loss of 3.1 ± 0.2 K ┊" in row for row in rows)
+
+
+def test_without_braille_there_is_no_spark_that_says_nothing(
+    model: LiveModel, make_cycle: MakeCycle
+) -> None:
+    rows = texts(fed(model, make_cycle(0.0), INSIGHT), utf8=False)[18:22]
+    assert not any("**" in row or "##" in row for row in rows)
+
+
 def test_a_drift_is_a_warning_until_it_is_gone(model: LiveModel, make_cycle: MakeCycle) -> None:
     fed(model, make_cycle(0.0), INSIGHT)
     for t_s, active in ((10.0, True), (20.0, False)):
