@@ -12,10 +12,12 @@ from thermoctl.signals import Cycle
 
 def insights_for(loops: Mapping[str, LoopTable]) -> dict[str, Insights]:
     """Return a watch for every loop."""
-    return {
-        name: Insights(table.period_s, table.heater_w, table.power_max)
-        for name, table in loops.items()
-    }
+    return {name: _watch(table) for name, table in loops.items()}
+
+
+def _watch(table: LoopTable) -> Insights:
+    power_min = 0.0 if table.cooler is None else -table.cooler.power_max
+    return Insights(table.period_s, table.heater_w, table.power_max, power_min)
 
 
 class InsightService(Beside[Insights]):

@@ -17,6 +17,8 @@ from thermoctl.insight.rows import Known
 
 SIGMAS = 3.0
 """A drift is beyond so many standard deviations."""
+HELD_BACK = 2
+"""Values enter a baseline so many times later than they are compared: a drift is named before."""
 RELEASED = 0.5
 """It ends when less than this share of what names it is left."""
 
@@ -114,7 +116,7 @@ class Baseline:
         self._recent.append(value)
         if follow:
             self._waiting.append(value)
-            if len(self._waiting) > (self._recent.maxlen or 1):
+            if len(self._waiting) > HELD_BACK * (self._recent.maxlen or 1):
                 self._take(self._waiting.popleft())
         else:
             self._waiting.clear()

@@ -26,6 +26,9 @@ from thermoctl.quantities import Array
 ORDER = 30
 """Past errors in the autoregression."""
 
+LONGEST = 600
+"""Weights of the moving average that are looked at."""
+
 FEWEST = 10
 """Samples for each of them at least."""
 
@@ -81,10 +84,10 @@ def harris(error: Array, delay: int, order: int = ORDER) -> Harris | None:
     if not variance > 1e-18:
         return None
     coefficients, innovation_var = autoregression(e, order)
-    psi = impulse_response(coefficients, delay)
-    least = innovation_var * float(psi @ psi)
+    psi = impulse_response(coefficients, max(delay, min(N // 4, LONGEST)))
+    least = innovation_var * float(psi[:delay] @ psi[:delay])
     index = min(1.0, least / variance)
-    sd = index * math.sqrt(4.0 / N * _spread(e, psi, index))
+    sd = index * math.sqrt(4.0 / N * _spread(psi, delay))
     return Harris(index, sd, math.sqrt(variance), math.sqrt(index * variance))
 
 
@@ -121,14 +124,17 @@ def autocorrelation(e: Array, lags: int) -> Array:
     return np.asarray(r / r[0], dtype=np.float64)
 
 
-def _spread(e: Array, psi: Array, index: float) -> float:
+def _spread(psi: Array, delay: int) -> float:
     """Return the bracket of the variance of the index by Desborough and Harris (1992).
 
-    Autocorrelations enter up to the lag at which they are lost in their own error.
+    Autocorrelations are those of the model: those of the samples have errors that add up.
     """
-    N, d = len(e), len(psi)
-    r = autocorrelation(e, min(N // 4, 20 * ORDER))
-    r = np.where(np.abs(r) > 2.0 / math.sqrt(N), r, 0.0)
-    within = np.correlate(psi, psi, "full")[d - 1 :] / float(psi @ psi)
-    early = r[1:d] - within[1:]
-    return float(early @ early + r[d:] @ r[d:])
+    within = _correlations(psi[:delay])
+    r = _correlations(psi)
+    early = r[1:delay] - within[1:]
+    return float(early @ early + r[delay:] @ r[delay:])
+
+
+def _correlations(psi: Array) -> Array:
+    """Return the autocorrelations of a moving average, lag 0 first."""
+    return autocorrelation(psi, len(psi) - 1)

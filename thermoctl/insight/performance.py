@@ -26,6 +26,8 @@ TURN_S = 60.0
 """Time from one judgement to the next."""
 AT_BOUND = 0.05
 """A power that is at a bound for a larger share of the time is limited."""
+NEAR = 1e-3
+"""A power no farther from a bound than this is at it."""
 STEPS = 1.5
 """A deviation below so many steps of the sensor is made of them."""
 NOISY = 0.5
@@ -48,12 +50,13 @@ class PerformanceWatch:
     ----------
     period_s : float
         Time between two samples.
-    power_max : float
-        Most power that is given.
+    power_min, power_max : float
+        Least and most power that is given.
     """
 
-    def __init__(self, period_s: float, power_max: float = 1.0) -> None:
-        self._period_s, self._power_max = period_s, power_max
+    def __init__(self, period_s: float, power_min: float = 0.0, power_max: float = 1.0) -> None:
+        self._period_s = period_s
+        self._powers = (power_min + NEAR, power_max - NEAR)
         self._error: deque[float] = deque(maxlen=LONGEST)
         self._reading: deque[float] = deque(maxlen=LONGEST)
         self._bound: deque[bool] = deque(maxlen=LONGEST)
@@ -87,7 +90,8 @@ class PerformanceWatch:
         """
         self._error.append(reading_c - setpoint_c)
         self._reading.append(reading_c)
-        self._bound.append(power <= 1e-3 or power >= self._power_max - 1e-3)
+        low, high = self._powers
+        self._bound.append(not low < power < high)
         if t_s >= self._due_s:
             self._due_s = t_s + TURN_S
             self.now = self._judged(lag_s, sd)

@@ -46,8 +46,8 @@ class Insights:
         Time between two samples.
     heater_w : float, optional
         Rated power of the heater in W; without it nothing is told in watts, joules or litres.
-    power_max : float
-        Most power that is ever given, as a fraction.
+    power_max, power_min : float
+        Most and least power that is ever given, as a fraction; below 0 it cools.
 
     Raises
     ------
@@ -56,7 +56,11 @@ class Insights:
     """
 
     def __init__(
-        self, period_s: float = 1.0, heater_w: float | None = None, power_max: float = 1.0
+        self,
+        period_s: float = 1.0,
+        heater_w: float | None = None,
+        power_max: float = 1.0,
+        power_min: float = 0.0,
     ) -> None:
         named = (("period_s", period_s), ("heater_w", heater_w), ("power_max", power_max))
         for name, value in named:
@@ -64,7 +68,7 @@ class Insights:
                 raise ValueError(f"{name} must be positive and finite, got {value!r}")
         self._period_s, self._heater_w = period_s, heater_w
         self._witness, self._gate, self._rest = Witness(period_s), GateWatch(), Rest()
-        self._performance = PerformanceWatch(period_s, power_max)
+        self._performance = PerformanceWatch(period_s, power_min, power_max)
         self._faults = Faults()
         self._known: _Known | None = None
         self._changes: deque[Change] = deque(maxlen=CHANGES)
