@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from thermoctl.app.clerk import Clerk
 from thermoctl.app.insight_watch import InsightService, insights_for
 from thermoctl.app.insight_words import insight_lines
 from thermoctl.app.sim import bench_settings, simulate
 from thermoctl.insight import Change, Drift, Gate, Insight, Insights, Performance, Row
+from thermoctl.services.control_protocol import Call
 from thermoctl.signals import Event
 
 
@@ -60,6 +62,25 @@ def test_a_watch_that_fails_is_dropped_and_told_of_once():
 def test_every_loop_has_a_watch():
     settings = bench_settings()
     assert set(insights_for(settings.loops)) == set(settings.loops)
+
+
+def test_status_has_what_is_told_with_times_of_the_wall_clock(tmp_path):
+    change = Change(40.0, "step.loss", -1.0, 0.1, "K", "step loss")
+    seen = cycles(3)[-1]
+    clerk = Clerk(
+        loop=None,
+        seen={seen.loop: seen},
+        periods_s={seen.loop: 1.0},
+        latches=None,
+        state=tmp_path,
+        now_s=lambda: 100.0,
+        wall_clock=lambda: 1_000_060.0,
+        insight=lambda loop: Insight(100.0, Gate.PAUSED, changes=(change,)),
+    )
+    (record,) = clerk.answer(Call("status"))["loops"]
+    (told,) = record["insight"]["changes"]
+    assert told["text"] == "step loss"
+    assert told["at"] == "1970-01-12T13:46:40+00:00"  # a minute ago
 
 
 def test_nothing_is_told_of_a_loop_without_a_watch():
