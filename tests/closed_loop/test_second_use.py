@@ -106,3 +106,38 @@ def test_the_second_uses_meet_their_figures(row):
         assert not any(c.truth["heater_w"] and c.step.command.power < 0.0 for c in cycles[1:])
         missed |= {(leg, k): v for k, v in measured.items() if not v <= getattr(leg, k)}
     assert missed == {}
+
+
+# -- a loop within a loop --------------------------------------------------------------------------
+
+BLOCK_MAX_C = 80.0
+"""The hottest that the outer loop of the profile may ask for."""
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_cascade_holds_the_bath_and_its_block_stays_below_its_maximum(seed):
+    document = load(CONFIG / "cascade.toml").model_dump()
+    document["boards"]["daq"]["tolerances"] = 0.1
+    cycles, clock = [], SimulatedClock()
+    loop = loop_for(bench_settings(load(document), seed), clock, cycles.append, beside=False)
+    for t_s in range(3600):
+        clock.sleep_until(float(t_s))
+        if t_s == 1800:
+            loop.boards[0].board.disturb("cold-water", 0.5)
+        loop.cycle(float(t_s))
+    assert loop.shut_down()
+    bath = [cycle for cycle in cycles if cycle.loop == "bath"]
+    truth = np.array([cycle.truth["true_temperature_c"] for cycle in bath])
+    hottest_c = max(cycle.truth["element_c"] for cycle in cycles)
+    overshoot_k, again_k = truth[:1800].max() - 37.5, truth[1800:].max() - 37.5
+    deviation_mk = 1e3 * truth[1200:1800].std()
+    print(
+        f"cascade, specimen {seed}: overshoot {overshoot_k:.3f} K, {deviation_mk:.1f} mK rms, "
+        f"after half a litre of cold water {again_k:.3f} K, block at most {hottest_c:.2f} degC"
+    )
+    assert {cycle.step.state for cycle in cycles} <= {State.RUN, State.RIDE, State.HOLD}
+    assert overshoot_k <= 0.1
+    assert again_k <= 0.15
+    assert deviation_mk <= 30.0
+    assert abs(truth[-300:] - 37.5).max() <= 0.15
+    assert hottest_c <= BLOCK_MAX_C + 2.0

@@ -18,4 +18,6 @@ def mirrored(situation: Situation) -> Situation:
         temperature_c=-situation.temperature_c,
         setpoint_c=-situation.setpoint_c,
         measured_c=-situation.measured_c,
+        setpoint_rate_k_per_s=-situation.setpoint_rate_k_per_s,
+        target_c=-situation.target_c,
     )

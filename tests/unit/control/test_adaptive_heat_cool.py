@@ -132,8 +132,9 @@ def test_a_pid_that_cools_is_one_that_heats_seen_upside_down():
 
 
 def test_a_mirrored_situation_is_its_own_mirror_and_leaves_power_alone():
-    seen = replace(situation(21.0, 20.0, 0.3), measured_c=21.5)
-    again = mirrored(mirrored(seen))
-    names = ("temperature_c", "setpoint_c", "measured_c", "applied")
-    assert all(getattr(again, name) == getattr(seen, name) for name in names)
+    ramped = {"measured_c": 21.5, "setpoint_rate_k_per_s": 0.01, "target_c": 25.0}
+    seen = replace(situation(21.0, 20.0, 0.3), **ramped)
+    turned, again = mirrored(seen), mirrored(mirrored(seen))
+    for name in ("temperature_c", "setpoint_c", *ramped):
+        assert getattr(turned, name) == -getattr(seen, name) == -getattr(again, name)
     assert mirrored(seen).applied == 0.3

@@ -217,6 +217,17 @@ def test_less_is_none(asked, taken):
     assert bench.see().state is State.RUN
 
 
+# -- what is learnt --------------------------------------------------------------------------------
+
+
+def test_the_model_beside_a_lone_cooler_learns_that_power_takes_heat_out():
+    bench = Bench(1.0, **COOLS)
+    gain_k = 0.0449  # that of the model when nothing else is configured
+    for second in range(50):
+        step = bench.see(temperature_c=55.0 - gain_k * second)
+    assert step.beliefs.a == pytest.approx(1.0, abs=1e-5)
+
+
 # -- by hand ---------------------------------------------------------------------------------------
 
 
@@ -248,6 +259,11 @@ def test_holding_the_last_power_never_gives_more_than_the_operator_wants_now():
 def test_limits_that_make_no_sense_are_refused_by_name(key, value):
     with pytest.raises(ValueError, match=key):
         Limits(60.0, 0.0, 0.0, 60.0, **{key: value})
+
+
+@pytest.mark.parametrize("power", [math.nan, math.inf, -math.inf, None, "full", True])
+def test_what_is_no_power_is_possible_as_0_alone(power):
+    assert Limits(60.0, 0.0, 0.0, 60.0, **BOTH).possible(power) == 0.0
 
 
 def test_a_lone_cooler_has_no_cooler_beside_it():

@@ -127,6 +127,7 @@ def test_a_trip_of_the_bath_takes_the_block_s_power_at_the_first_reading():
     bench.run(1)
     assert bench.bath.step.state is not State.LATCHED
     assert bench.block.accepted_power == 0.0
+    assert bench.block.step.command.reason == "master.off"
 
 
 def test_power_by_hand_in_the_block_does_not_outlive_the_bath_either():

@@ -1,0 +1,100 @@
+"""A loop that leads another in a configuration: everything that keeps it from that is told."""
+
+from pathlib import Path
+
+import pytest
+
+from thermoctl.app.compose import loop_for, wiring_errors
+from thermoctl.app.document import BadConfiguration
+from thermoctl.app.parts import plan_for
+from thermoctl.app.settings import load
+from thermoctl.app.sim import bench_settings
+from thermoctl.app.tables import CascadeTable
+from thermoctl.app.trial import alone
+from thermoctl.errors import ConfigError
+from thermoctl.runtime.clock import SimulatedClock
+
+CONFIG = Path(__file__).parents[3] / "config"
+
+
+def cascade(**actuator):
+    """Return the profile with other keys in the actuator of its outer loop."""
+    document = load(CONFIG / "cascade.toml").in_force()
+    document["loops"]["bath"]["actuator"] |= actuator
+    return document
+
+
+def complaints(document):
+    with pytest.raises(BadConfiguration) as caught:
+        load(document)
+    return [line.removeprefix("configuration: loops.") for line in str(caught.value).splitlines()]
+
+
+def test_an_actuator_with_a_loop_leads_it_and_drives_no_output():
+    table = load(cascade()).loops["bath"]
+    assert table.leads == CascadeTable(loop="block", low_c=20.0, high_c=80.0)
+    assert table.outputs == ()
+    assert plan_for(table).limits.applied_tolerance == 1.0
+
+
+def test_what_is_in_force_loads_as_the_same_cascade():
+    loaded = load(cascade())
+    assert load(loaded.in_force()) == loaded
+
+
+@pytest.mark.parametrize(("keys", "told"), [
+    ({"loop": "blok"}, "bath.actuator.loop: no table [loops.blok] there; did you mean 'block'?"),
+    ({"loop": "bath"}, "bath.actuator.loop: following bath leads back to bath"),
+    ({"low_c": 10.0}, "bath.actuator.low_c: expected a set point of block, 20 to 80 and below its "
+     "trip at 95, got 10"),
+    ({"high_c": 90.0}, "bath.actuator.high_c: expected a set point of block, 20 to 80 and below "
+     "its trip at 95, got 90"),
+    ({"low_c": 80.0}, "bath.actuator: low_c 80 must lie below high_c 80"),
+    ({"low_c": "cold"}, 'bath.actuator.low_c: expected a number, got "cold"'),
+])  # fmt: skip
+def test_a_cascade_that_cannot_be_is_refused_by_name(keys, told):
+    assert complaints(cascade(**keys)) == [told]
+
+
+def test_an_actuator_needs_a_board_or_a_loop():
+    document = cascade()
+    document["loops"]["bath"]["actuator"] = {"law": "linear"}
+    assert complaints(document) == ["bath.actuator.board: is missing"]
+
+
+def test_loops_do_not_lead_each_other_in_a_circle():
+    document = cascade()
+    document["loops"]["block"]["actuator"] = {"loop": "bath", "low_c": 20.0, "high_c": 50.0}
+    assert complaints(document) == [
+        "bath.actuator.loop: following block leads back to bath",
+        "block.actuator.loop: following bath leads back to block",
+    ]
+
+
+def test_a_loop_has_one_master():
+    document = cascade()
+    document["loops"]["other"] = document["loops"]["bath"]
+    assert complaints(document) == ["other.actuator.loop: block follows bath already"]
+
+
+def test_an_outer_loop_has_no_cooler_and_its_law_heats():
+    document = cascade()
+    document["loops"]["bath"]["cooler"] = {"board": "daq"}
+    document["loops"]["bath"]["controller"] = {"kind": "adaptive", "action": "heat-cool"}
+    told = complaints(document)
+    assert any("more power is a higher set point of the next" in line for line in told)
+    assert "bath.cooler: expected none, for block is what acts in this loop" in told
+
+
+def test_an_outer_loop_cannot_run_without_the_one_it_leads():
+    settings = alone(load(cascade()), "bath")
+    assert [key for key, _ in wiring_errors(settings)] == [("loops", "bath", "actuator", "loop")]
+    with pytest.raises(ConfigError, match=r"no table \[loops.block\]"):
+        loop_for(settings, SimulatedClock(), lambda cycle: None)
+
+
+def test_a_cascade_on_real_boards_has_no_stand_in():
+    document = cascade()
+    document["boards"]["daq"] = {"kind": "thermodaq", "port": "/dev/null"}
+    with pytest.raises(ConfigError, match="needs simulated boards"):
+        bench_settings(load(document))
