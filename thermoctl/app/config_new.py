@@ -199,7 +199,7 @@ def _loop_lines(answers: Answers) -> list[str]:
         "",
         "[loops.tank.controller]",
         _line("kind", "adaptive", "learns gain, loss and lag by itself"),
-        _line("calmness", Adaptive().calmness, "0.3 is brisk, 1.2 calm"),
+        _line("calmness", Adaptive().calmness, "0.2 is brisk, 0.8 calm"),
         "",
         "[loops.tank.model]",
         _line("structure", "known-gain"),

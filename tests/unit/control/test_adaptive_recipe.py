@@ -9,7 +9,7 @@ import pytest
 from thermoctl.control.adaptive.bank import Bank
 from thermoctl.control.adaptive.coasting import FASTEST_PERIODS, power_for
 
-SHAPES = [(0.18, 0.31, 0.51), (0.10, 0.75, 0.15)]
+SHAPES = [(0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.10, 0.15, 0.75)]
 
 
 @dataclass
@@ -36,14 +36,18 @@ class Filter:
     def advance(self, powers):
         self.q += (1.0 - math.exp(-self.h / self.t1_s)) * (powers[self.nd] - self.q)
 
-    def predict(self):
+    def predict(self, away, t_s):
         a = 1.0 - math.exp(-self.h / self.t2_s)
         F = np.array([[1, 0, -self.h, self.h * self.q], [a, 1 - a, 0, 0], [0, 0, 1, 0],
                       [0, 0, 0, 1]])  # fmt: skip
         b = max(self.x[3], 1e-4)
-        noise = [(0.06 * b) ** 2, 0.003**2, (0.0015 * b) ** 2, (2e-4 * b) ** 2]
+        restless = 1 + 5 * away
+        noise = [(0.08 * b) ** 2, 0.003**2, (0.0008 * b * restless) ** 2, (2e-4 * b) ** 2]
         self.x = F @ self.x
         self.P = F @ self.P @ F.T + self.h * np.diag(noise)
+        if t_s - self.h <= 2 * self.lag_s < t_s:
+            ridge = np.array([0, 0, 1, 1]) * 0.15 * self.x[3] * self.q
+            self.P = self.P + np.outer(ridge, ridge)
 
     def inflate(self, nu, R):
         root = math.sqrt(max(1.0, nu**2 / (self.P[1, 1] + R)))
@@ -94,8 +98,9 @@ class PlainBank:
             for each in self.filters:
                 each.begin(y)
         self.k += 1
+        away = abs(u - self.told[0]) if self.k > 0 else 0.0
         for each in self.filters:
-            each.predict()
+            each.predict(away, self.k * self.h)
         if valid:
             self.meet(y, e)
         return self.decide(r)
@@ -119,12 +124,20 @@ class PlainBank:
         if jumped:
             self.silent_until_s = self.k * self.h + 5 * likeliest.lag_s
         heard = not jumped and self.k >= 4 and self.k * self.h >= self.silent_until_s
+        settling = not jumped and self.k * self.h < self.silent_until_s
+        shares = [math.exp(each.ln_w) for each in self.filters]
+        told = []
         for each in self.filters:
             if jumped:
                 each.inflate(nu_m, R)
             nu, S = each.correct(y, R, self.u_min, self.k * self.h > 60)
             if heard:
                 each.ln_w -= 0.5 * e * (math.log(S) + min(nu**2 / S, 9))
+            told.append(math.exp(-0.5 * (math.log(S) + min(nu**2 / S, 9))))
+        for j, each in enumerate(self.filters if settling else []):
+            family = range(j - j % 3, j - j % 3 + 3)  # all shapes of one lag
+            kept = sum(shares[i] for i in family) / sum(shares[i] * told[i] for i in family)
+            each.ln_w += math.log(told[j] * kept)
         best = max(each.ln_w for each in self.filters)
         for each in self.filters:
             each.ln_w = max(each.ln_w - best, -30.0)
@@ -135,7 +148,11 @@ class PlainBank:
         u_ss, coasting, lag, beta = w @ np.array(rows) / w.sum()
         self.told = (u_ss, coasting, lag, beta)
         Tc = max(3.0, FASTEST_PERIODS * self.h, self.kappa * lag)
-        return min(max(u_ss + (r - coasting) / (beta * Tc), self.u_min), self.u_max)
+        tau, before = 0.4 * Tc, self.powers[0]
+        aim = coasting + beta * tau * (before - u_ss)
+        wanted = u_ss + (r - aim) / (beta * Tc)
+        u = before + (wanted - before) * self.h / (self.h + tau)
+        return min(max(u, self.u_min), self.u_max)
 
 
 def eventful(samples, h, seed):
@@ -180,7 +197,7 @@ def test_every_step_is_that_of_filters_run_one_by_one(h, u_min, samples):
         if belief.outlook is None:
             assert expected == 0.0
             continue
-        u = power_for(belief.outlook, r, 0.6, h, bank.bounds)
+        u = power_for(belief.outlook, r, 0.6, h, bank.bounds, belief.path.powers[0])
         jumps += belief.gate.jumped
         saturated += u in bank.bounds
         told = (belief.outlook.holding_power, belief.outlook.coasting_c, belief.outlook.lag_s,

@@ -9,6 +9,7 @@ Implements section 9 of ``docs/theory.md``.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -29,7 +30,7 @@ from thermoctl.control.adaptive.evidence import (
 from thermoctl.control.adaptive.filters import X, Z
 from thermoctl.control.adaptive.hypotheses import Hypotheses
 from thermoctl.control.adaptive.path import Path
-from thermoctl.quantities import clamp, is_finite_number
+from thermoctl.quantities import Array, clamp, is_finite_number
 
 LOSS_FROM_S = 60.0
 """The loss is limited by the gain from then on: before, the gain is hardly known."""
@@ -109,6 +110,7 @@ class Bank:
     u_max: float = 1.0
     hypotheses: Hypotheses = field(init=False, repr=False)
     drift: filters.Drift = field(init=False, repr=False)
+    _arrivals: Mapping[int, Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("u_min", "u_max"):
@@ -120,6 +122,7 @@ class Bank:
             raise ValueError(f"u_max must be positive, got {self.u_max!r}")
         object.__setattr__(self, "hypotheses", Hypotheses.at_period(self.period_s))
         object.__setattr__(self, "drift", filters.drift(self.period_s))
+        object.__setattr__(self, "_arrivals", _arrivals(self.hypotheses))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -165,7 +168,7 @@ class Bank:
         sample, blind = belief.sample + 1, 0 if seen else belief.blind + 1
         block = self._begun(belief, y_c)
         if blind * self.period_s <= BLIND_S:
-            block = filters.predicted(block, way.heat, hypotheses.sensor_step, self.drift)
+            block = self._ahead(block, way, sample, _unrest(belief.outlook, power))
         met = Met(belief.noise, belief.gate, belief.weights, 0.0, block)
         if seen:
             met = self._met(met, y_c, sample, excitation.share)
@@ -194,6 +197,14 @@ class Bank:
             return filters.restarted(belief.block, self.hypotheses, y_c)
         return belief.block
 
+    def _ahead(self, block: filters.Block, way: Path, sample: int, unrest: float) -> filters.Block:
+        """Return the block predicted for `sample`."""
+        block = filters.predicted(block, way.heat, self.hypotheses.sensor_step, self.drift, unrest)
+        arrived = self._arrivals.get(sample)
+        if arrived is not None:
+            filters.loosened(block, way.heat, arrived)
+        return block
+
     def _met(self, before: Met, y_c: float, sample: int, share: float) -> Met:
         """Return what becomes of the prediction when the reading `y_c` meets it."""
         noise, gate, weights, heard, block = before
@@ -215,4 +226,17 @@ class Bank:
         )
         if share > 0.0 and sample >= max(EVIDENCE_FROM, gate.silent_until):
             weights, heard = weights.after(share, nus, S), share
+        elif sample < gate.silent_until and not gate.jumped:
+            weights = weights.among_shapes(nus, S)
         return Met(noise, gate, weights, heard, block)
+
+
+def _arrivals(hypotheses: Hypotheses) -> Mapping[int, Array]:
+    """Return, by sample, under which hypotheses the heat has just arrived."""
+    samples = np.floor(filters.LOSS_LAGS * hypotheses.lag_s / hypotheses.period_s) + 1.0
+    return {int(sample): samples == sample for sample in np.unique(samples)}
+
+
+def _unrest(outlook: Outlook | None, power: float) -> float:
+    """Return how far `power` was from what holds the water; 0 while that is not known."""
+    return 0.0 if outlook is None else abs(power - outlook.holding_power)

@@ -3,17 +3,20 @@ r"""Where the water would come to rest, and the power that follows from it.
 .. math::
 
     T_\infty = T + \beta\,\Bigl[t_1 (q - u_{ss}) + h \sum_{i=0}^{n_d-1} (u_{k-1-i} - u_{ss})\Bigr],
-    \qquad u = u_{ss} + \frac{r - T_\infty}{\beta\, T_c}
+    \qquad v = u_{ss} + \frac{r - T_\infty - \beta\,\tau\,(u_{k-1} - u_{ss})}{\beta\, T_c},
+    \qquad u = u_{k-1} + \frac{h}{h + \tau}\,(v - u_{k-1})
 
 All heat that is still under way is in :math:`T_\infty`, taken from the power that was applied. So
 there is nothing to wind up, full power lasts until the last moment, and whoever steered before, the
-law goes on without a bump.
+law goes on without a bump. The power follows v with the lag :math:`\tau`, which is heat under way
+like any other: the temperature is led to the set point as without it, and by far less travel.
 
 On a ramp :math:`r + \rho t` the power to rest with is :math:`u_{ss} + \rho/\beta` instead: with it
-from now on the water comes to lie on the line :math:`T_\infty - \rho\,\tau + \rho t`, where
-:math:`\tau = t_1 + h n_d` is the lag ahead of the water, and that line shall be the ramp. Hence
+from now on the water comes to lie on the line :math:`T_\infty - \rho\,\lambda + \rho t`, where
+:math:`\lambda = t_1 + h n_d` is the lag ahead of the water, and that line shall be the ramp. Hence,
+for a power without a lag of its own,
 
-.. math:: u = u_{ss} + \frac{\rho}{\beta} + \frac{r + \rho\,\tau - T_\infty}{\beta\, T_c},
+.. math:: u = u_{ss} + \frac{\rho}{\beta} + \frac{r + \rho\,\lambda - T_\infty}{\beta\, T_c},
 
 which is the law above for where the ramp will be when the heat of now arrives. The sensor's lag has
 no part in it, for the filters see through it.
@@ -37,6 +40,9 @@ FASTEST_S = 3.0
 FASTEST_PERIODS = 1.5
 """Nor shorter than so many samples: at one sample any error of the gain would be given back whole,
 and below it the loop would be unstable."""
+SMOOTHNESS = 0.4
+"""The lag of the power itself, as a share of Tc. Noise costs a third of the travel it would cost at
+once, while a power that has far to go is at its limit at once all the same."""
 
 
 class Outlook(NamedTuple):
@@ -89,15 +95,34 @@ def power_for(
     calmness: float,
     period_s: float,
     bounds: tuple[float, float],
+    before: float,
     ramp_power: float = 0.0,
 ) -> float:
     """Return the power that lets the water come to rest at the set point within Tc.
 
-    On a ramp, `ramp_power` is what lets the water rise with it, and the set point that of `ahead`.
+    Parameters
+    ----------
+    outlook : Outlook
+        What is expected.
+    setpoint_c : float
+        Where the water is to come to rest, in degC; on a ramp, that of `ahead`.
+    calmness : float
+        Tc as a share of the lag.
+    period_s : float
+        Time between two samples.
+    bounds : tuple of float
+        Least and most power.
+    before : float
+        Power of the last period, as it was applied.
+    ramp_power : float
+        What lets the water rise with a ramp, beside the holding power.
     """
     Tc_s = max(FASTEST_S, FASTEST_PERIODS * period_s, calmness * outlook.lag_s)
-    error_k = setpoint_c - outlook.coasting_c
-    return clamp(outlook.holding_power + ramp_power + error_k / (outlook.gain * Tc_s), *bounds)
+    tau_s = SMOOTHNESS * Tc_s
+    resting = outlook.holding_power + ramp_power
+    aim_c = outlook.coasting_c + outlook.gain * tau_s * (before - resting)
+    wanted = resting + (setpoint_c - aim_c) / (outlook.gain * Tc_s)
+    return clamp(before + (wanted - before) * period_s / (period_s + tau_s), *bounds)
 
 
 def ahead(

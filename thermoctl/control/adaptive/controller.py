@@ -67,14 +67,14 @@ class AdaptiveBelief:
 class Adaptive:
     r"""Learn any plant with a bank of Kalman filters; nothing has to be tuned.
 
-    32 hypotheses about lag and its shape each learn water temperature, loss and gain; they are
+    48 hypotheses about lag and its shape each learn water temperature, loss and gain; they are
     weighted by how well they predicted. The power cancels the error of the temperature at which
     the water would come to rest, within :math:`T_c = \max(3\,\mathrm{s}, 1.5\,h, \kappa L)`.
 
     Parameters
     ----------
     calmness : float
-        kappa, from .1 to 10: .3 is brisk, 1.2 calm. The one thing to choose.
+        kappa, from .1 to 10: .2 is brisk, .8 calm. The one thing to choose.
     period_s : float
         Time between two samples, as the loop has it. Longer and shorter intervals are met by as
         many predictions as periods went by.
@@ -90,7 +90,7 @@ class Adaptive:
         An argument is outside its range.
     """
 
-    calmness: float = 0.7
+    calmness: float = 0.35
     period_s: float = 1.0
     action: Literal["heat", "cool", "heat-cool"] = "heat"
     cooling_ratio: float = 0.2
@@ -181,13 +181,14 @@ class Adaptive:
         outlook, setpoint_c = belief.bank.outlook, situation.setpoint_c
         if outlook is None or not math.isfinite(setpoint_c):
             return belief, math.nan
+        before = float(belief.bank.path.powers[0])
         bounds, r_c, ramp_heat = self.bank.bounds, self._sign * setpoint_c, 0.0
         if situation.setpoint_rate_k_per_s != 0.0:
             rate = self._sign * situation.setpoint_rate_k_per_s
             end_c = self._sign * situation.target_c
             r_c, rate = ahead(r_c, rate, end_c, self.bank.lead_s(belief.bank))
             ramp_heat = rate / outlook.gain
-        heat = power_for(outlook, r_c, self.calmness, self.period_s, bounds, ramp_heat)
+        heat = power_for(outlook, r_c, self.calmness, self.period_s, bounds, before, ramp_heat)
         return belief, self._power(heat)
 
     def surprise_k(self, belief: AdaptiveBelief, situation: Situation) -> float:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thermoctl.control.adaptive.hypotheses import Hypotheses
+from thermoctl.control.adaptive.hypotheses import LAGS, Hypotheses
 from thermoctl.quantities import Array, clamp
 
 # -- noise ----------------------------------------------------------------------------------------
@@ -94,7 +94,8 @@ GATE_SAMPLES = 20
 OUTLIERS = 2
 """So many samples outside in a row are nobody's; one more, and the water has jumped."""
 HOLD_LAGS = 5.0
-"""No evidence for so many lags after a jump, or it would be read as a change of lag."""
+"""No evidence about lags for so many of them after a jump, or it would be read as a change of lag.
+What it says of shapes is heard: how fast the reading follows is the sensor alone."""
 
 
 class Gate(NamedTuple):
@@ -152,13 +153,32 @@ class Weights(NamedTuple):
 
     def after(self, e: float, nu: Array, S: Array) -> Weights:
         """Return the weights after innovations `nu` of variances `S`, counted as `e`."""
-        log = nu * nu
-        log /= S
-        np.minimum(log, SURPRISE_MAX, out=log)
-        log += np.log(S)
-        log *= -0.5 * e
+        log = _likelihood(nu, S, e)
         log += self.log  # ALF (6)-(7), in logarithms
         return weighted(log)
+
+    def among_shapes(self, nu: Array, S: Array) -> Weights:
+        """Return the weights after innovations that speak of shapes alone.
+
+        Of each lag all shapes together keep the weight they had.
+        """
+        log, before = _likelihood(nu, S, 1.0).reshape(LAGS, -1), self.share.reshape(LAGS, -1)
+        log -= log.max(axis=1, keepdims=True)
+        after = before * np.exp(log)
+        log += np.log(before.sum(axis=1, keepdims=True) / after.sum(axis=1, keepdims=True))
+        each = log.reshape(-1)
+        each += self.log
+        return weighted(each)
+
+
+def _likelihood(nu: Array, S: Array, e: float) -> Array:
+    """Return `e` times the log likelihood of innovations `nu` of variances `S`; no constants."""
+    log = nu * nu
+    log /= S
+    np.minimum(log, SURPRISE_MAX, out=log)
+    log += np.log(S)
+    log *= -0.5 * e
+    return log
 
 
 def weighted(log: Array) -> Weights:

@@ -32,8 +32,14 @@ cannot tell the two apart, and a loss that was learnt there in place of a gain i
 START_CORRELATION = 0.98
 """Of T and z: a sensor shows the water it lies in."""
 
-DRIFT_T, DRIFT_D, DRIFT_BETA = 0.06, 0.0015, 2e-4
+DRIFT_T, DRIFT_D, DRIFT_BETA = 0.08, 0.0008, 2e-4
 """Noise of T, d and beta in a second, as shares of the gain."""
+UNREST = 5.0
+"""The noise of d grows by this share for every full range between power and holding power: water on
+its way to another temperature, glass and air behind it, loses what it did not lose before."""
+LOSS_LAGS, LOSS_SHARE = 2.0, 0.15
+"""After so many lags the heat has arrived, and the gain is known well enough to say how large a
+loss may be: this share of it is the standard deviation that `loosened` adds."""
 DRIFT_Z_K = 0.003
 """Noise of z in a second."""
 DRIFT_GAIN_MIN = 1e-4
@@ -115,8 +121,13 @@ def restarted(block: Block, hypotheses: Hypotheses, y_c: float) -> Block:
     return after
 
 
-def predicted(block: Block, heat: Array, sensor_step: Array, drift: Drift) -> Block:
-    """Return the block one period later: T' = T - d + beta q, z' = z + a (T - z)."""
+def predicted(
+    block: Block, heat: Array, sensor_step: Array, drift: Drift, unrest: float = 0.0
+) -> Block:
+    """Return the block one period later: T' = T - d + beta q, z' = z + a (T - z).
+
+    `unrest` is how far the power was from what holds the water.
+    """
     after = block.copy()
     _move(after, heat, sensor_step)  # F [P | x]
     _move(after[T], heat, sensor_step)  # F P F', row by row where both row and column move
@@ -126,10 +137,22 @@ def predicted(block: Block, heat: Array, sensor_step: Array, drift: Drift) -> Bl
     b = np.maximum(block[BETA, X], drift.gain_min)
     b *= b
     noise = drift.per_gain * b
+    noise[D] *= (1.0 + UNREST * unrest) ** 2
     noise[Z] = drift.z
     diagonal = after.reshape(20, -1)[:19:6]  # elements (0, 0), (1, 1), (2, 2), (3, 3)
     diagonal += noise
     return after
+
+
+def loosened(block: Block, heat: Array, due: Array) -> None:
+    """Make gain and loss of a new block uncertain together, where it is `due`; in place.
+
+    Under constant heat only their difference shows. The start is tight on the loss, so that it does
+    not take the place of a gain; now both may grow or shrink by as much, and what was learnt of the
+    difference is kept. When the heat falls, the loss is found within seconds.
+    """
+    spread = LOSS_SHARE * due * heat * block[BETA, X]
+    block[D:, D:X] += spread * spread
 
 
 def _move(rows: Block, heat: Array, sensor_step: Array) -> None:

@@ -1,4 +1,4 @@
-"""What the plant might be: total lags times two ways of dividing them.
+"""What the plant might be: total lags times three ways of dividing them.
 
 Implements section 9 of ``docs/theory.md``.
 """
@@ -18,8 +18,9 @@ LONGEST_OVER_SHORTEST = 50.0
 LAGS = 16
 """3 to 150 s in ratios of 1.30. Beyond 1.43 a plant that lies between two of them is held badly."""
 
-SHAPES = ((0.18, 0.31, 0.51), (0.10, 0.75, 0.15))
-"""Shares of dead time, heater and sensor: a slow sensor, and a slow heater."""
+SHAPES = ((0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.10, 0.15, 0.75))
+"""Shares of dead time, heater and sensor. The last two are each other's mirror: power they answer
+alike, and only water that moves by itself tells a slow sensor from a slow heater."""
 
 PERIOD_MIN_S, PERIOD_MAX_S = 0.05, 3600.0
 
