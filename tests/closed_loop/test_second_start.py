@@ -24,7 +24,7 @@ from thermoctl.services.learned import LearnedStore, ModelKeeper
 pytestmark = pytest.mark.slow  # several minutes of plants
 
 AQUARIUM = Path(__file__).parents[2] / "config" / "aquarium.toml"
-SETPOINT_C, BAND_K, SEED = 37.5, 0.1, 32
+SETPOINT_C, BAND_K, HELD_S, SEED = 37.5, 0.1, 120, 32
 
 
 @dataclass(frozen=True)
@@ -40,20 +40,21 @@ class Row:
     overshoot_k: float = 0.1
     settled_s: float = np.inf
     dropped_s: float = np.inf
+    largest_k: float = np.inf
 
 
 ROWS = (
-    Row("the same plant", 900, settled_s=385),  # 420 s at the first start
-    Row("half the water", 700, {"volume_l": 4.0}, settled_s=265, dropped_s=60),  # 252 s
-    Row("twice the water", 1300, {"volume_l": 16.0}, settled_s=820),  # 802 s
+    Row("the same plant", 900, settled_s=390),  # 420 s at the first start
+    Row("half the water", 700, {"volume_l": 4.0}, settled_s=275, dropped_s=60),  # 252 s
+    Row("twice the water", 1300, {"volume_l": 16.0}, settled_s=830),  # 802 s
     Row("three times the lag", 1200, {"element_lag_s": 40.5, "sensor_lag_s": 18.0},
-        settled_s=665),  # 608 s, at most 650
-    Row("a third of the lag", 900, {"element_lag_s": 4.5, "sensor_lag_s": 2.0}, settled_s=390),
-    Row("half the heater", 1400, {"heater_w": 750.0}, settled_s=910),  # 880 s
-    Row("twice the heater", 700, {"heater_w": 3000.0}, settled_s=265, dropped_s=60),  # 242 s
+        settled_s=680),  # 608 s, at most 650
+    Row("a third of the lag", 900, {"element_lag_s": 4.5, "sensor_lag_s": 2.0}, settled_s=400),
+    Row("half the heater", 1400, {"heater_w": 750.0}, settled_s=920),  # 880 s
+    Row("twice the heater", 700, {"heater_w": 3000.0}, settled_s=275, dropped_s=60),  # 242 s
     Row("an eighth of the water", 700, {"volume_l": 1.0, "ice_kg": 0.0}, overshoot_k=0.15,
         settled_s=190, dropped_s=30),  # 123 s, at most 144
-    Row("a restart at the set point", 700, {"initial_c": SETPOINT_C}, settled_s=120),  # up to 246 s
+    Row("a restart at the set point", 700, {"initial_c": SETPOINT_C}, largest_k=0.3),
 )  # fmt: skip
 
 
@@ -89,10 +90,15 @@ def events(cycles, name):
     return [cycle.step.t_s for cycle in cycles for each in cycle.step.events if each.name == name]
 
 
+def errors_k(cycles):
+    return np.array([cycle.truth["true_temperature_c"] - SETPOINT_C for cycle in cycles])
+
+
 def settled_s(cycles):
-    truth = np.array([cycle.truth["true_temperature_c"] for cycle in cycles])
-    outside = np.flatnonzero(np.abs(truth - SETPOINT_C) > BAND_K)
-    return float(outside[-1] + 1) if outside.size else 0.0
+    """Return from when on the water is within .1 K for two minutes."""
+    within = (np.abs(errors_k(cycles)) <= BAND_K).astype(float)
+    held = np.convolve(within, np.ones(HELD_S), mode="valid") > HELD_S - 0.5
+    return float(np.argmax(held)) if held.any() else np.inf
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
@@ -100,12 +106,13 @@ def test_a_start_with_the_model_of_the_rig_meets_its_figures(row, store):
     remembered, warning = store.load("tank")
     assert warning is None
     cycles = play(row.tank, row.seconds, remembered)
-    overshoot_k = max(cycle.truth["true_temperature_c"] for cycle in cycles) - SETPOINT_C
+    overshoot_k = errors_k(cycles).max()
     dropped = events(cycles, "model.dropped")
     print(f"{row.name}: {overshoot_k:.3f} K, {settled_s(cycles):.0f} s, dropped {dropped}")
     assert len(events(cycles, "model.recalled")) == 1
     assert overshoot_k < row.overshoot_k
     assert settled_s(cycles) < row.settled_s
+    assert np.abs(errors_k(cycles)).max() < row.largest_k
     if row.dropped_s < np.inf:
         assert dropped
         assert dropped[0] < row.dropped_s
@@ -122,8 +129,8 @@ POISON = {
     "a gain ten times too large": {"gain_k_per_s": 0.42, "gain_sd_k_per_s": 0.001},
     "hardly any loss left to hold": {"loss_k_per_s": 0.038},
     "a loss that heats": {"loss_k_per_s": -0.02},
-    "the shortest lag": {"log_weights": [0.0] + [-30.0] * 31},
-    "the longest lag": {"log_weights": [-30.0] * 31 + [0.0]},
+    "the shortest lag": {"likeliest": 0},
+    "the longest lag": {"likeliest": -1},
     "noise of ten kelvin": {"noise_variance_k2": 100.0},
 }
 
@@ -136,14 +143,16 @@ def test_a_model_that_lies_within_its_bounds_costs_no_more_than_a_tenth_of_a_kel
     path = tmp_path / "model-tank.json"
     whole = json.loads(store.path_of("tank").read_text())
     model = whole["content"]["models"]["adaptive"]["model"]
-    model.update(changed)
+    sure = [-30.0] * len(model["log_weights"])
+    sure[changed.get("likeliest", 0)] = 0.0
+    model.update(changed | ({"log_weights": sure} if "likeliest" in changed else {}))
     if "loss_k_per_s" not in changed:
         share = model["gain_k_per_s"]
         model["loss_k_per_s"] = min(model["loss_k_per_s"], 0.5 * share)
     path.write_text(json.dumps(whole))
     cycles = play({}, 900, LearnedStore(tmp_path).load("tank")[0])
     assert events(cycles, "model.recalled")
-    overshoot_k = max(cycle.truth["true_temperature_c"] for cycle in cycles) - SETPOINT_C
+    overshoot_k = errors_k(cycles).max()
     print(f"{overshoot_k:.3f} K, settled {settled_s(cycles):.0f} s")
     assert overshoot_k < 0.1
     assert settled_s(cycles) < 520.0

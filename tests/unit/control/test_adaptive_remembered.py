@@ -21,6 +21,7 @@ from thermoctl.ports import Situation
 NOTHING = start(n=1)
 PAST = np.zeros(1)
 LAW = Adaptive()
+N = len(LAW.bank.hypotheses)
 
 
 def situation(measured_c, applied, setpoint_c=40.0, period_s=1.0):
@@ -199,11 +200,11 @@ BAD = {
     "more loss than power": {"loss_k_per_s": 0.05},
     "a loss that heats": {"loss_k_per_s": -0.05},
     "endless noise": {"noise_variance_k2": math.inf},
-    "too few weights": {"log_weights": [0.0] * 31},
-    "a weight of NaN": {"log_weights": [0.0] * 31 + [math.nan]},
-    "no weight of 0": {"log_weights": [-1.0] * 32},
-    "a weight above 0": {"log_weights": [0.0] * 31 + [5.0]},
-    "a weight below the floor": {"log_weights": [0.0] * 31 + [-1e9]},
+    "too few weights": {"log_weights": [0.0] * (N - 1)},
+    "a weight of NaN": {"log_weights": [0.0] * (N - 1) + [math.nan]},
+    "no weight of 0": {"log_weights": [-1.0] * N},
+    "a weight above 0": {"log_weights": [0.0] * (N - 1) + [5.0]},
+    "a weight below the floor": {"log_weights": [0.0] * (N - 1) + [-1e9]},
     "no weights at all": {"log_weights": None},
     "another period": {"period_s": 2.0},
     "another action": {"action": "cool"},
