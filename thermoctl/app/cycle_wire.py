@@ -35,6 +35,12 @@ from thermoctl.signals import (
 
 T = TypeVar("T", Alarm, Change, Drift, Event, Feasible, Performance, Row, ShadowScore)
 
+_HINTS = {
+    kind: get_type_hints(kind)
+    for kind in (Alarm, Change, Drift, Event, Feasible, Performance, Row, ShadowScore)
+}
+"""Types of the fields; found out once, because that takes longer than all the rest."""
+
 
 def details_of(cycle: Cycle, insight: Insight | None = None) -> dict[str, Any]:
     """Return what a view needs of `cycle` and its record does not hold.
@@ -147,7 +153,7 @@ def _estimate(record: Mapping[str, Any], details: Mapping[str, Any]) -> Estimate
 
 def _made(kind: type[T], told: Mapping[str, Any]) -> T:
     """Return a `kind`; keys of a newer daemon are passed over, and null is a number not known."""
-    hints = get_type_hints(kind)
+    hints = _HINTS[kind]
     given = {}
     for each in fields(kind):
         if each.name in told or (each.default is MISSING and each.default_factory is MISSING):

@@ -82,6 +82,7 @@ def test_an_older_file_is_read_as_it_is_with_nothing_in_the_columns_it_lacks(old
     assert columns["shadow"].tolist() == [None, None]
     assert np.isnan(columns["shadow_power"]).all()
     assert np.isnan(columns["lag_s"]).all()
+    assert np.isnan(columns["reference_c"]).all()
     assert older.read_bytes() == before
 
 
@@ -101,6 +102,28 @@ def test_an_older_file_is_gone_on_with_and_keeps_its_rows(older, cycle_at, wall_
     assert columns["shadow_power"].tolist()[2] == 0.75
     assert [math.isnan(lag_s) for lag_s in columns["lag_s"]] == [True, True, False]
     assert list(older.parent.glob("*-set-aside-*")) == []
+
+
+SECOND = ("lag_s REAL", "shadow TEXT", "shadow_power REAL")
+"""What the second schema has that the first lacks."""
+
+
+def test_a_file_of_the_second_schema_gets_what_that_lacks_and_nothing_twice(older, cycle_at):
+    with closing(sqlite3.connect(older)) as connection:
+        for column in SECOND:
+            connection.execute(f"ALTER TABLE cycles ADD COLUMN {column}")
+        connection.execute("UPDATE cycles SET shadow = 'pid'")
+        connection.execute("PRAGMA user_version = 2")
+        connection.commit()
+    assert read_history(older).columns["shadow"].tolist() == ["pid", "pid"]
+    writer = HistoryWriter(older, RunInfo("0.3.0"))
+    cycle = cycle_at(3.0)
+    writer.publish(replace(cycle, step=replace(cycle.step, reference_c=39.5)))
+    assert writer.store_waiting()
+    writer.close()
+    columns = read_history(older).columns
+    assert columns["shadow"].tolist() == ["pid", "pid", None]
+    assert columns["reference_c"].tolist()[2] == 39.5
 
 
 def test_a_file_is_brought_up_to_date_once_and_opens_again(older):

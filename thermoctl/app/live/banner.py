@@ -16,6 +16,9 @@ from thermoctl.signals import Alarm, Quality, State
 ROOMY = 100
 """Width from which words are written out."""
 
+_ON_RAMP_K = 0.005
+"""A ramp this near its set point reads like it."""
+
 _QUALITY_WORDS = {
     Quality.GOOD: "reading is no number",
     Quality.MISSING: "no sample",
@@ -161,6 +164,8 @@ def values_row(view: View, look: Look, width: int) -> Text:
         change = f"  {numbers.difference(view.deviation_k):>8}"
         left = [(value, role), (change, Role.TEXT)]
     left += [("    set ", Role.MUTE), (numbers.temperature(view.setpoint_c), Role.STRONG)]
+    if abs(view.followed_c - view.setpoint_c) >= _ON_RAMP_K:
+        left += [(" ramp at ", Role.MUTE), (numbers.temperature(view.followed_c), Role.TEXT)]
     left += [("    power ", Role.MUTE)]
     if math.isnan(view.accepted_power):
         left += [(numbers.UNKNOWN, Role.STRONG), (" nothing accepted", Role.TEXT)]

@@ -187,14 +187,25 @@ class View:
         return _NAN if self.step is None else _known(self.step.setpoint_c)
 
     @property
+    def followed_c(self) -> float:
+        """Return where the ramp to the set point is; the set point where there is none."""
+        return _NAN if self.step is None else _followed(self.step)
+
+    @property
     def deviation_k(self) -> float:
-        """Return temperature minus set point; NaN when either is not known."""
-        return self.temperature_c - self.setpoint_c
+        """Return temperature minus what is followed; NaN when either is not known."""
+        return self.temperature_c - self.followed_c
 
     @property
     def beliefs(self) -> Beliefs:
         """Return the last beliefs."""
         return Beliefs() if self.step is None else self.step.beliefs
+
+
+def _followed(step: Step) -> float:
+    """Return the temperature a controller that steers is after; else the set point."""
+    ramp_c = _known(step.reference_c) if step.mode in STEERED else _NAN
+    return _known(step.setpoint_c) if ramp_c != ramp_c else ramp_c
 
 
 def told(insight: Insight | None, name: str) -> Row | None:
@@ -282,7 +293,8 @@ class LiveModel:
         if self._first_s != self._first_s:
             self._first_s = step.t_s
         setpoint_c = _known(step.setpoint_c)
-        deviation_k = temperature_c - setpoint_c
+        followed_c = _followed(step)
+        deviation_k = temperature_c - followed_c
         innovation = _in_sigma(step)
         self._innovations.append(innovation)
         self._judged.append(innovation if step.mode in STEERED else _NAN)
@@ -293,7 +305,7 @@ class LiveModel:
         self._recorder.add(
             step.t_s,
             (temperature_c, 1e3 * deviation_k, _known(cycle.accepted_power)),
-            (_known(step.estimate.inflation), setpoint_c, *_believed(step, insight)),
+            (_known(step.estimate.inflation), followed_c, *_believed(step, insight)),
         )
         for event in step.events:
             self.note(event)

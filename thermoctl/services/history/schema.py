@@ -15,7 +15,7 @@ from typing import Any, Final, Literal
 from thermoctl.services.plain import as_json
 from thermoctl.signals import Cycle, Event
 
-SCHEMA_VERSION: Final = 2
+SCHEMA_VERSION: Final = 3
 """Kept in ``PRAGMA user_version``; a higher one was written by a newer thermoctl."""
 
 APPLICATION_ID: Final = 0x7468726D
@@ -86,6 +86,7 @@ COLUMNS: Final = (
     Column("temperature_c", "REAL", lambda c: c.step.measurement.temperature_c),
     Column("quality", "TEXT", lambda c: c.step.measurement.quality.value),
     Column("setpoint_c", "REAL", lambda c: c.step.setpoint_c),
+    Column("reference_c", "REAL", lambda c: c.step.reference_c, since=3),
     Column("power", "REAL", lambda c: c.step.command.power),
     Column("accepted_power", "REAL", lambda c: c.accepted_power),
     Column("reason", "TEXT", lambda c: c.step.command.reason),

@@ -224,6 +224,20 @@ def test_nothing_is_expected_of_a_loop_that_is_off(model: LiveModel, make_cycle:
     assert "needs" not in row
 
 
+def test_a_ramp_is_told_of_and_what_it_follows_is_what_deviates(
+    model: LiveModel, make_cycle: MakeCycle
+) -> None:
+    cycle = make_cycle(0.0, 39.25, setpoint_c=44.0)
+    view = fed(model, replace(cycle, step=replace(cycle.step, reference_c=39.2)), None)
+    for size in ((80, 24), (100, 30)):
+        assert spaced(view, *size)[1].startswith(
+            "39.25 °C +50 mK set 44.00 °C ramp at 39.20 °C power 23.1 %"
+        )
+    off = make_cycle(0.0, 39.25, setpoint_c=44.0, mode=Mode.OFF)
+    view = fed(model, replace(off, step=replace(off.step, reference_c=39.25)), None)
+    assert "−4.75 K set 44.00 °C power" in spaced(view)[1]
+
+
 # -- below zero ------------------------------------------------------------------------------------
 
 
