@@ -1,7 +1,8 @@
 """Units and the few numbers every room shares.
 
 A float with a dimension wears it in its name: ``_s`` seconds, ``_c`` degrees Celsius, ``_k`` kelvin
-(a difference), ``_w`` watts, ``_v`` volts. Power is a fraction in [0, 1] and is called ``power``.
+(a difference), ``_w`` watts, ``_v`` volts. Power is a fraction in [0, 1] and is called ``power``;
+with a cooler beside the heater it goes down to -1.
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@ class SetPoint:
 
 @dataclass(frozen=True, slots=True)
 class ManualPower:
-    """Request: give `power`, a fraction in [0, 1], while the mode is MANUAL."""
+    """Request: give `power`, in [0, 1] or with a cooler [-1, 1], while the mode is MANUAL."""
 
     power: float
 
@@ -258,7 +258,7 @@ class Command:
     Parameters
     ----------
     power : float
-        Fraction in [0, 1], finite, already bounded.
+        Fraction in [0, 1], finite, already bounded; in [-1, 1] where there is a cooler.
     valid_until_s : float
         Loop time after which no level may go on giving this power.
     reason : str

@@ -42,14 +42,17 @@ def _temperature(text: str) -> float:
 
 
 def _power(text: str) -> float:
-    """Return a power in [0, 1], written ``30%`` or ``0.3``; ``ValueError`` if it is none."""
+    """Return a power in [-1, 1], written ``30%`` or ``0.3``; ``ValueError`` if it is none.
+
+    Which of them a loop takes, its regulator says.
+    """
     percent = text.strip().endswith("%")
     try:
         power = float(text.strip().removesuffix("%")) / (100.0 if percent else 1.0)
     except ValueError:
         power = math.nan
-    if not 0.0 <= power <= 1.0:
-        raise ValueError(f"expected a power such as 30% or 0.3, from 0 to 1, got {text!r}")
+    if not -1.0 <= power <= 1.0:
+        raise ValueError(f"expected a power such as 30% or 0.3, from -1 to 1, got {text!r}")
     return power
 
 
@@ -128,13 +131,16 @@ def mode(mode: str, loop: str | None, socket: Path | None, as_json: bool) -> Non
     _tell(told, as_json, lambda: f"mode {told['mode']}")
 
 
-@click.command(epilog=examples("thermoctl output 30%", "thermoctl output 0"))
+@click.command(
+    epilog=examples("thermoctl output 30%", "thermoctl output -30% --loop tank"),
+    context_settings={"ignore_unknown_options": True},  # a power below 0 is none
+)
 @click.argument("power", type=_POWER)
 @loop_option
 @socket_option
 @json_option
 def output(power: float, loop: str | None, socket: Path | None, as_json: bool) -> None:
-    """Give this power while the mode is manual."""
+    """Give this power while the mode is manual; below 0 it is a cooler's."""
     told = _asked(socket, "output", loop=loop, power=power)
     _tell(told, as_json, lambda: f"power {_plain(numbers.power(told['power']))}")
 

@@ -102,7 +102,16 @@ EVENTS: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Level of every event by its name."""
 
-REASONS: Final = frozenset({"limit.high", "limit.low", "limit.rate", "sensor.good"})
+REASONS: Final = frozenset(
+    {
+        "limit.changeover",
+        "limit.high",
+        "limit.low",
+        "limit.rate",
+        "master.off",
+        "sensor.good",
+    }
+)
 """Dotted names that only occur as the reason of a power or of a change of state."""
 
 
