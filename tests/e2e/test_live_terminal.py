@@ -11,11 +11,13 @@ import subprocess
 import sys
 import termios
 import time
+from pathlib import Path
 
 import pytest
 
 pytestmark = pytest.mark.e2e
 
+AQUARIUM = (Path(__file__).parents[2] / "config" / "aquarium.toml").read_text()
 PATIENCE_S = 20.0
 CODES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 ROW = re.compile(r"\x1b\[(\d+);1H")
@@ -57,6 +59,14 @@ class Terminal:
             if time.monotonic() > until_s or self.process.poll() is not None:
                 pytest.fail(f"no {words!r} within {PATIENCE_S} s on:\n{picture}")
             time.sleep(0.02)
+
+    def wait_in_lines(self, words):
+        """Wait for `words` where nothing is drawn."""
+        until_s = time.monotonic() + PATIENCE_S
+        while words not in self.received and time.monotonic() < until_s:
+            self.read()
+            time.sleep(0.02)
+        assert words in self.received
 
     def end(self, keys=b"q"):
         """Leave, and return the exit code and what was said on stderr."""
@@ -161,10 +171,7 @@ def test_a_daemon_that_goes_is_told_of_and_found_again(daemon, terminal):
 
 def test_lines_are_to_be_had_on_a_terminal_too(daemon, terminal):
     lines = terminal("watch", "--lines", environ=daemon.environ)
-    until_s = time.monotonic() + PATIENCE_S
-    while "auto run" not in lines.received and time.monotonic() < until_s:
-        lines.read()
-        time.sleep(0.02)
+    lines.wait_in_lines("auto run")
     assert re.search(r"tank +\d\d\.\d\d °C +set +37\.50 °C .* auto run", lines.received)
     assert "\x1b" not in lines.received
     lines.process.send_signal(signal.SIGINT)
@@ -177,3 +184,22 @@ def test_a_view_of_a_daemon_that_is_not_there_ends_as_any_other_call_does(termin
     assert code == 3
     assert "running daemon" in errors
     assert "\x1b" not in view.received
+
+
+def test_several_loops_are_lines_until_one_of_them_is_named(start, terminal):
+    renamed = {"loops.tank": "loops.mash", "boards.daq": "boards.other", '= "daq"': '= "other"'}
+    second = AQUARIUM
+    for old, new in renamed.items():
+        second = second.replace(old, new)
+    daemon = start(config=AQUARIUM + second)
+    daemon.wait_for("board.opened", 2)
+    daemon.wait_for("socket.opened")
+    both = terminal("watch", environ=daemon.environ)
+    both.wait_in_lines("mash ")
+    both.wait_in_lines("tank ")
+    both.process.send_signal(signal.SIGINT)
+    code, errors = both.end(b"")
+    assert (code, "--loop NAME shows one of" in errors) == (0, True)
+    one = terminal("watch", "--loop", "mash", environ=daemon.environ)
+    one.wait_for("thermoctl mash")
+    assert one.end() == (0, "")
