@@ -14,8 +14,8 @@ from thermoctl.insight.rest import Rest
 from thermoctl.insight.samples import Samples
 from thermoctl.quantities import Array
 
-WINDOW_S, WINDOW_LAGS = 1_800.0, 100.0
-"""Noise is learnt from a stretch at rest that is so long, and at least so many lags."""
+WINDOW_S, WINDOW_LAGS, WINDOW = 1_800.0, 100.0, 600
+"""Noise is learnt from a stretch at rest that is so long, so many lags, and so many samples."""
 SETTLED_LAGS = 10.0
 """A move is assayed when the loop has been at rest for so many lags."""
 BEFORE_LAGS = 5.0
@@ -37,7 +37,7 @@ class Reckoning:
 
     def __init__(self, lag_s: float, gain_k_per_s: float, samples: Samples) -> None:
         self._lag_s, self._gain_k_per_s, self._samples = lag_s, gain_k_per_s, samples
-        self._window_s = max(WINDOW_S, WINDOW_LAGS * lag_s)
+        self._window_s = max(WINDOW_S, WINDOW_LAGS * lag_s, WINDOW * samples.period_s)
         self._whitener: Array | None = None
         self._assayed_s = -math.inf
         self._from_s = -math.inf

@@ -9,6 +9,9 @@ from thermoctl.signals import Mode, Quality, State, Step
 BAND_K, BAND_NOISES = 0.3, 10.0
 """At rest the reading is no farther from the set point than the larger of the two."""
 
+QUIET_S = 60.0
+"""A rest that is shorter does not part one move from the next."""
+
 MOVED_K = 0.05
 """A set point that moves by less moves nothing."""
 
@@ -17,7 +20,8 @@ class Rest:
     """Follows mode, set point and deviation.
 
     `since_s` is the time since which the loop is at rest, NaN while it is not; `moved_s` that at
-    which somebody last moved it: the first sample, another set point, mode or state.
+    which somebody began to move it: the first sample, another set point, mode or state. Moves that
+    follow before it was at rest for `QUIET_S`, as on a ramp, are one.
     """
 
     def __init__(self) -> None:
@@ -31,7 +35,9 @@ class Rest:
         moved = wanted != self._wanted or not abs(step.setpoint_c - self._setpoint_c) <= MOVED_K
         if moved:
             self._wanted, self._setpoint_c = wanted, step.setpoint_c
-            self.moved_s, self.since_s = step.t_s, math.nan
+            if math.isnan(self.moved_s) or self.lasts_s(step.t_s) >= QUIET_S:
+                self.moved_s = step.t_s
+            self.since_s = math.nan
         if step.measurement.quality is not Quality.GOOD:
             return moved
         band_k = max(BAND_K, BAND_NOISES * noise_sd_k)

@@ -86,7 +86,8 @@ def _of_heater(
     """Return the rows that need the rated power of the heater."""
     names = (("volume", "water", "l"), ("loss_w", "loss", "W"), ("loss_w_per_k", "loss", "W/K"))
     if heater_w is None or not gain.value > 0.0:
-        return tuple(_unknown(*each, NO_HEATER) for each in names)
+        why = NO_HEATER if heater_w is None else "power cools"
+        return tuple(_unknown(*each, why) for each in names)
     one = Known(physics.litres(heater_w), 0.0)
     capacity = Known(heater_w, 0.0).over(gain)
     if slope is None:

@@ -14,8 +14,8 @@ PER_LAG = 20
 """Samples in a lag are enough."""
 FINEST_S = 0.5
 """Samples closer than this are taken together as they come."""
-KEPT_S, KEPT_LAGS = 7_200.0, 400.0
-"""What is kept: so long, and at least so many lags."""
+KEPT_S, KEPT_LAGS, KEPT = 7_200.0, 400.0, 2_400
+"""What is kept: so long, and at least so many lags and samples."""
 BRIDGED = 5
 """Readings that may be missing in a row; more of them break a stretch."""
 
@@ -31,7 +31,7 @@ class Samples:
 
     def __init__(self, period_s: float) -> None:
         self._together = max(1, round(FINEST_S / period_s))
-        self._period_s = self._together * period_s
+        self.period_s = self._together * period_s
         self._rows = array("d")
         self._open: list[tuple[float, float, float]] = []
         self._last_c, self._missing = math.nan, 0
@@ -50,22 +50,22 @@ class Samples:
         if len(self._open) == self._together:
             self._rows.extend(_mean(self._open))
             self._open.clear()
-            kept = 3 * math.ceil(max(KEPT_S, KEPT_LAGS * lag_s) / self._period_s)
+            kept = 3 * max(KEPT, math.ceil(max(KEPT_S, KEPT_LAGS * lag_s) / self.period_s))
             if len(self._rows) > kept + kept // 4:
                 del self._rows[:-kept]
 
     def between(self, begin_s: float, end_s: float, lag_s: float) -> Stretch | None:
         """Return what is kept from `begin_s` to `end_s`; None where the begin is lost."""
         rows: Array = np.array(self._rows).reshape(-1, 3)
-        if not len(rows) or rows[0, 0] > begin_s + 2.0 * self._period_s:
+        if not len(rows) or rows[0, 0] > begin_s + 2.0 * self.period_s:
             return None
         rows = rows[(rows[:, 0] >= begin_s) & (rows[:, 0] <= end_s)]
-        thin = max(1, math.floor(lag_s / PER_LAG / self._period_s))
+        thin = max(1, math.floor(lag_s / PER_LAG / self.period_s))
         whole = len(rows) // thin * thin
         if whole < 2 * thin:
             return None
         thinned = rows[:whole].reshape(-1, thin, 3).mean(axis=1)
-        return Stretch(thinned[:, 1], thinned[:, 2], thin * self._period_s)
+        return Stretch(thinned[:, 1], thinned[:, 2], thin * self.period_s)
 
 
 def _mean(rows: list[tuple[float, float, float]]) -> tuple[float, ...]:

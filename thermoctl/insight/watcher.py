@@ -70,6 +70,7 @@ class Insights:
         self._witness, self._gate, self._rest = Witness(period_s), GateWatch(), Rest()
         self._performance = PerformanceWatch(period_s, power_min, power_max)
         self._faults = Faults()
+        self._samples = Samples(period_s)
         self._known: _Known | None = None
         self._changes: deque[Change] = deque(maxlen=CHANGES)
         self._applied, self._power = 0.0, _Turn()
@@ -120,34 +121,32 @@ class Insights:
         """Show the step to everyone who watches."""
         good = step.measurement.quality is Quality.GOOD
         reading_c = step.measurement.temperature_c if good else math.nan
+        self._samples.take(step.t_s, reading_c, applied, plant.lag_s)
         known = self._known_after(step, plant)
         if known is None:
             return
-        known.samples.take(step.t_s, reading_c, applied, plant.lag_s)
-        if not known.settled:
-            return
-        noise_k = plant.noise_sd_k
-        found = known.changes.after(step.t_s, reading_c, applied, noise_k)
+        found = known.changes.after(step.t_s, reading_c, applied, plant.noise_sd_k)
         if found is not None:
-            self._found(step.t_s, found)
+            self._found(known, step.t_s, found)
         if plant.jumped:
-            self._jumped(step.t_s)
-        reckoned = known.reckoning.after(step.t_s, self._rest)
-        if reckoned is not None:
-            self._reckoned(step.t_s, reckoned)
+            self._jumped(known, step.t_s)
+        assay = known.reckoning.after(step.t_s, self._rest)
+        if assay is not None:
+            self._assayed(known, step.t_s, assay)
         if good and self._rest.lasts_s(step.t_s) > 0.0 and not known.changes.busy:
             self._at_rest(step, plant, reading_c)
 
     def _known_after(self, step: Step, plant: PlantBelief) -> _Known | None:
         """Return what is known of the plant, which begins when the loop is first at rest."""
-        known = self._known
-        if known is None or known.outlived(plant.lag_s):
-            self._known = known = _Known(self._period_s, plant)
+        if self._known is not None and not self._known.outlived(plant.lag_s):
+            return self._known
         settled_s = max(SETTLED_S, SETTLED_LAGS * plant.lag_s)
         sure = 0.0 < plant.gain_sd_k_per_s < SURE * abs(plant.gain_k_per_s)
-        if not known.settled and sure and self._rest.lasts_s(step.t_s) >= settled_s:
-            known.settle(plant, self._applied)
-        return known
+        settled = sure and self._rest.lasts_s(step.t_s) >= settled_s
+        self._known = (
+            _Known(self._period_s, plant, self._samples, self._applied) if settled else None
+        )
+        return self._known
 
     def _at_rest(self, step: Step, plant: PlantBelief, reading_c: float) -> None:
         """Judge what can only be judged at rest."""
@@ -159,30 +158,24 @@ class Insights:
         if mean is not None:
             self._faults.turn(step.t_s, mean, plant.noise_sd_k)
 
-    def _found(self, t_s: float, found: Found) -> None:
-        known = self._known
-        assert known is not None
+    def _found(self, known: _Known, t_s: float, found: Found) -> None:
         self._changes.appendleft(change_of(found, known.gain, self._given_w()))
         known.reckoning.disturb(t_s)
         self._power = _Turn()
         if found.step_k is not None:
             self._faults.add_cold(dilution(found))
 
-    def _jumped(self, t_s: float) -> None:
+    def _jumped(self, known: _Known, t_s: float) -> None:
         """Date a jump that nobody can measure, because the loop was moved as well."""
-        known = self._known
-        assert known is not None
         first = t_s - self._jumped_s > known.lag_s * SETTLED_LAGS
         self._jumped_s = t_s
         moving = t_s - self._rest.moved_s < max(SETTLED_S, 2.0 * SETTLED_LAGS * known.lag_s)
         if first and moving and not known.changes.busy:
             self._changes.appendleft(jump_at(t_s))
 
-    def _reckoned(self, t_s: float, found: Assay) -> None:
-        known = self._known
-        assert known is not None
+    def _assayed(self, known: _Known, t_s: float, found: Assay) -> None:
         compared = self._faults.reckon(t_s, found.gain)
-        known.assayed(found, self._applied)
+        known.take(found, self._applied)
         if compared is not None:
             self._changes.appendleft(change_of_gain(self._rest.moved_s, compared))
 
@@ -195,11 +188,10 @@ class Insights:
         if step.t_s >= self._rows_due_s:
             self._rows_due_s = step.t_s + ROWS_S
             gain = Known(plant.gain_k_per_s, plant.gain_sd_k_per_s)
-            sure = known is not None and known.settled
             told = rows(
                 plant,
-                known.gain if known is not None and sure else gain,
-                known.slope if known is not None else None,
+                gain if known is None else known.gain,
+                None if known is None else known.slope,
                 self._given_w(),
             )
         self._now = Insight(
@@ -270,33 +262,19 @@ class _Turn:
 class _Known:
     """A plant that can be watched: its lag and gain, and who watches with them."""
 
-    def __init__(self, period_s: float, plant: PlantBelief) -> None:
+    def __init__(self, period_s: float, plant: PlantBelief, samples: Samples, power: float) -> None:
         self._period_s, self.lag_s = period_s, plant.lag_s
         self.gain = Known(plant.gain_k_per_s, plant.gain_sd_k_per_s)
         self.slope: Known | None = None
-        self.samples = Samples(period_s)
-        self.settled = False
+        self.reckoning = Reckoning(self.lag_s, self.gain.value, samples)
+        self.changes = ChangeWatch(period_s, self.lag_s, self.gain.value, power)
 
     def outlived(self, lag_s: float) -> bool:
         """Return whether the plant has another lag by now."""
-        if not self.settled:
-            return False
         return not self.lag_s / LAG_MOVED <= lag_s <= self.lag_s * LAG_MOVED
 
-    def settle(self, plant: PlantBelief, power: float) -> None:
-        """Begin to watch with what is believed now."""
-        self.settled = True
-        self.lag_s = plant.lag_s
-        self.gain = Known(plant.gain_k_per_s, plant.gain_sd_k_per_s)
-        self.reckoning = Reckoning(self.lag_s, self.gain.value, self.samples)
-        self._watch_changes(power)
-
-    def _watch_changes(self, power: float) -> None:
-        self.changes = ChangeWatch(self._period_s, self.lag_s, self.gain.value, power)
-
-    def assayed(self, found: Assay, power: float) -> None:
+    def take(self, found: Assay, power: float) -> None:
         """Take over a gain that was assayed on a move."""
-        self.gain = found.gain
-        self.slope = found.slope or self.slope
+        self.gain, self.slope = found.gain, found.slope or self.slope
         if not 1.0 / GAIN_MOVED <= self.gain.value / self.changes.gain_k_per_s <= GAIN_MOVED:
-            self._watch_changes(power)
+            self.changes = ChangeWatch(self._period_s, self.lag_s, self.gain.value, power)

@@ -73,9 +73,18 @@ def test_a_loop_that_is_held_is_at_rest_since_it_came_there():
 def test_another_set_point_mode_or_state_is_a_move(changed):
     rest = Rest()
     assert rest.after(step_at(0.0), 0.02)
-    assert not rest.after(step_at(1.0), 0.02)
-    assert rest.after(step_at(2.0, **changed), 0.02)
-    assert rest.moved_s == 2.0
+    assert not rest.after(step_at(100.0), 0.02)
+    assert rest.after(step_at(200.0, **changed), 0.02)
+    assert rest.moved_s == 200.0
+
+
+def test_a_ramp_is_one_move_from_its_begin():
+    rest = Rest()
+    rest.after(step_at(0.0), 0.02)
+    for k in range(100):
+        rest.after(step_at(200.0 + k, setpoint_c=37.5 + 0.03 * k, reading_c=37.5 + 0.03 * k), 0.02)
+    assert rest.moved_s == pytest.approx(200.0, abs=3.0)
+    assert rest.lasts_s(299.0) < 3.0
 
 
 def test_water_that_was_poured_in_ends_the_rest_and_is_no_move():

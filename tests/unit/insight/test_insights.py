@@ -71,6 +71,15 @@ def test_a_sample_without_a_reading_leaves_what_was_told():
     assert rig.watch.now is before
 
 
+def test_a_set_point_that_moves_before_anything_is_known_is_no_trouble():
+    rig = Rig()
+    rig.run(100.0)
+    rig.loop.ask(SetPoint(30.0))
+    rig.run(200.0)
+    assert rig.watch.now.t_s == rig.steps[-1].t_s
+    assert rig.told == []
+
+
 @pytest.mark.slow
 def test_cold_water_is_told_once_with_its_amount_and_its_time():
     rig = Rig(seed=2)
