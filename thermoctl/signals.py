@@ -3,7 +3,7 @@
     RawSample -> Measurement -> Estimate -> Command -> Step -> Cycle
 
 Requests travel the other way, through one queue that is read at the top of a cycle: `SetPoint`,
-`ManualPower`, `Mode`, `ChooseController`, `Acknowledge`.
+`ManualPower`, `Mode`, `Load`, `ChooseController`, `Acknowledge`.
 """
 
 from __future__ import annotations
@@ -79,11 +79,7 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class SetPoint:
-    """Request: hold `value_c`, in degC.
-
-    `rate_k_per_min` is how fast to go there, in K/min; None: as fast as is configured. It holds
-    for this request.
-    """
+    """Request: hold `value_c`, at most at `rate_k_per_min`; None: as configured."""
 
     value_c: float
     rate_k_per_min: float | None = None
@@ -94,6 +90,17 @@ class ManualPower:
     """Request: give `power`, in [0, 1] or with a cooler [-1, 1], while the mode is MANUAL."""
 
     power: float
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """Request: expect the plant to lose `power` more, for `duration_s` from now on.
+
+    A fraction of full power in [-1, 1], instead of a load that was announced before; 0 ends it.
+    """
+
+    power: float
+    duration_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +117,7 @@ class ChooseController:
     name: str
 
 
-Request = Mode | SetPoint | ManualPower | ChooseController | Acknowledge
+Request = Mode | SetPoint | ManualPower | Load | ChooseController | Acknowledge
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -321,7 +328,7 @@ class Step:
     """Everything the regulator made of one measurement.
 
     `setpoint_c` is the set point in force, `reference_c` what is followed now: the same, or where
-    the ramp to it is.
+    the ramp to it is. `load` is what the plant is known to lose beside its usual loss.
     `shadow` is the name of the controller that is asked beside `controller`, `shadow_power` what it
     would have given, within the limit of power; None where there is none, or no answer. `origin`
     says what the model of the one in charge began with: ``new`` with nothing, ``trial`` or
@@ -346,6 +353,7 @@ class Step:
     shadow_score: ShadowScore | None = None
     feasible: Feasible = field(default_factory=Feasible)
     reference_c: float = math.nan
+    load: float = 0.0
     tell: Callable[[], PlantBelief | None] = field(default=_nothing, repr=False)
     origin: str | None = None
     remember: Callable[[], Mapping[str, Mapping[str, Any]]] = field(default=_no_models, repr=False)

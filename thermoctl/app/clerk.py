@@ -25,6 +25,7 @@ from thermoctl.signals import (
     Alarm,
     ChooseController,
     Cycle,
+    Load,
     ManualPower,
     Mode,
     Request,
@@ -205,17 +206,21 @@ class Clerk:
 
     def _wish(self, call: Call, name: str) -> tuple[Request, dict[str, Any]]:
         """Return the request of a call, and what its reply says when it is granted."""
-        match call.do, call.argument:
-            case "set", float(value_c):
+        match call.do, call.argument, call.also:
+            case "set", float(value_c), None:
                 return SetPoint(value_c), {"setpoint_c": value_c}
-            case "output", float(power):
+            case "set", float(value_c), float(rate):
+                return SetPoint(value_c, rate), {"setpoint_c": value_c, "rate_k_per_min": rate}
+            case "load", float(power), float(duration_s):
+                return Load(power, duration_s), {"power": power, "duration_s": duration_s}
+            case "output", float(power), None:
                 self._require_manual(name)
                 return ManualPower(power), {"power": power}
-            case "mode", str(word):
+            case "mode", str(word), None:
                 if word not in _MODES:
                     raise CallError("bad_value", f"a mode of {', '.join(_MODES)}", word)
                 return Mode(word), {"mode": word}
-            case "controller", str(word):
+            case "controller", str(word), None:
                 return ChooseController(word), {"controller": word}
             case _:
                 raise CallError("unknown_call", "a call that this daemon knows", call.do)

@@ -28,6 +28,7 @@ _COMMANDS: Final = {
     "set": "thermoctl.app.control_commands:set_command",
     "mode": "thermoctl.app.control_commands:mode",
     "output": "thermoctl.app.control_commands:output",
+    "load": "thermoctl.app.control_commands:load",
     "controller": "thermoctl.app.control_commands:controller",
     "watch": "thermoctl.app.control_commands:watch",
     "alarms": "thermoctl.app.alarm_commands:alarms",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 from collections.abc import Callable, Mapping
 from datetime import datetime
@@ -20,13 +21,21 @@ from thermoctl.app.endings import EXIT_ALARM, EXIT_FAILED
 from thermoctl.app.insight_words import insight_lines
 from thermoctl.app.live import numbers
 from thermoctl.app.live.score import shadow_words
-from thermoctl.app.options import Parsed, examples, json_option, loop_option, socket_option
+from thermoctl.app.options import (
+    Duration,
+    Parsed,
+    examples,
+    json_option,
+    loop_option,
+    socket_option,
+)
 from thermoctl.errors import Refused
 from thermoctl.services.control_client import ControlClient
 from thermoctl.signals import ShadowScore
 
 _LATE_PERIODS: Final = 3.0
 _LATE_S: Final = 3.0
+_MINUTES: Final = {"min": 1.0, "h": 60.0}
 _REPLY_S: Final = 5.0  # beyond what the daemon itself gives its loop
 
 
@@ -56,7 +65,23 @@ def _power(text: str) -> float:
     return power
 
 
+def _load(text: str) -> float:
+    """Return a load in [-1, 1], written as a power; ``ValueError`` if it is none."""
+    size = text.strip().removeprefix("-")
+    return -_power(size) if size != text.strip() else _power(size)
+
+
+def _rate(text: str) -> float:
+    """Return a rate in K/min, written ``2/min``, ``2K/min`` or ``30/h``; else ``ValueError``."""
+    match = re.fullmatch(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(?:K|°C|degC)?\s*/\s*(min|h)\s*", text)
+    rate_k_per_min = math.nan if match is None else float(match[1]) / _MINUTES[match[2]]
+    if not rate_k_per_min > 0.0:
+        raise ValueError(f"expected a rate above 0 such as 2/min or 30K/h, got {text!r}")
+    return rate_k_per_min
+
+
 _TEMPERATURE, _POWER = Parsed("temperature", _temperature), Parsed("power", _power)
+_LOAD, _RATE = Parsed("load", _load), Parsed("rate", _rate)
 
 
 @click.command(epilog=examples("thermoctl status", "thermoctl status --check --json"))
@@ -108,16 +133,21 @@ def get(key: str, loop: str | None, socket: Path | None, as_json: bool) -> None:
 @click.command(
     "set",
     context_settings={"ignore_unknown_options": True},  # -5 is a temperature
-    epilog=examples("thermoctl set 65.0", "thermoctl set 40 --loop tank"),
+    epilog=examples("thermoctl set 65.0", "thermoctl set 65 --ramp 2/min --loop tank"),
 )
 @click.argument("value_c", metavar="TEMPERATURE", type=_TEMPERATURE)
+@click.option("--ramp", type=_RATE, help="Go there at this rate: 2/min, 30K/h.")
 @loop_option
 @socket_option
 @json_option
-def set_command(value_c: float, loop: str | None, socket: Path | None, as_json: bool) -> None:
-    """Hold another temperature, in °C."""
-    told = _asked(socket, "set", loop=loop, value_c=value_c)
-    _tell(told, as_json, lambda: f"set point {_plain(numbers.temperature(told['setpoint_c']))}")
+def set_command(
+    value_c: float, ramp: float | None, loop: str | None, socket: Path | None, as_json: bool
+) -> None:
+    """Hold another temperature, in °C; at once, or as fast as the configuration has it."""
+    told = _asked(socket, "set", loop=loop, value_c=value_c, rate_k_per_min=ramp)
+    at = "" if ramp is None else f", at {ramp:g} K/min"
+    words = f"set point {_plain(numbers.temperature(told['setpoint_c']))}{at}"
+    _tell(told, as_json, lambda: words)
 
 
 @click.command(epilog=examples("thermoctl mode auto", "thermoctl mode off --loop tank"))
@@ -143,6 +173,23 @@ def output(power: float, loop: str | None, socket: Path | None, as_json: bool) -
     """Give this power while the mode is manual; below 0 it is a cooler's."""
     told = _asked(socket, "output", loop=loop, power=power)
     _tell(told, as_json, lambda: f"power {_plain(numbers.power(told['power']))}")
+
+
+@click.command(
+    context_settings={"ignore_unknown_options": True},  # -10% is a load
+    epilog=examples("thermoctl load 20% --for 10m", "thermoctl load 0 --for 1s"),
+)
+@click.argument("power", metavar="POWER", type=_LOAD)
+@click.option("--for", "duration_s", type=Duration(), required=True, help="How long: 10m, 1h.")
+@loop_option
+@socket_option
+@json_option
+def load(
+    power: float, duration_s: float, loop: str | None, socket: Path | None, as_json: bool
+) -> None:
+    """Say that the plant is about to lose so much of full power beside its usual loss."""
+    told = _asked(socket, "load", loop=loop, power=power, duration_s=duration_s)
+    _tell(told, as_json, lambda: f"load {100.0 * told['power']:g} % for {told['duration_s']:g} s")
 
 
 @click.command(epilog=examples("thermoctl controller self-tuning-mv"))

@@ -43,6 +43,8 @@ def cycle_record(cycle: Cycle) -> dict[str, Any]:
         "temperature_c": finite(step.measurement.temperature_c),
         "quality": step.measurement.quality.value,
         "setpoint_c": step.setpoint_c,
+        "reference_c": finite(step.reference_c),
+        "load": step.load,
         "power": step.command.power,
         "accepted_power": finite(cycle.accepted_power),
         "controller": step.controller,

@@ -134,6 +134,8 @@ def _cycle(record: Mapping[str, Any], details: Mapping[str, Any]) -> Cycle:
         shadow_power=_maybe(record["shadow_power"]),
         shadow_score=None if score is None else _made(ShadowScore, score),
         feasible=_made(Feasible, record["feasible"]),
+        reference_c=_number(record["reference_c"]),
+        load=_number(record["load"]),
     )
     accepted, tick_us = _number(record["accepted_power"]), _number(record["tick_us"])
     return Cycle(str(record["loop"]), step, accepted, tick_us, _number(record["late_s"]))

@@ -16,6 +16,7 @@ from thermoctl.regulator.feasible import Feasibility, Wanted
 from thermoctl.regulator.guard import Guard
 from thermoctl.regulator.judge import Verdict
 from thermoctl.regulator.learning import Learning
+from thermoctl.regulator.load import KnownLoad
 from thermoctl.regulator.mind import Mind
 from thermoctl.regulator.plan import Plan
 from thermoctl.regulator.recollection import NOTHING, origin, recall, remembering
@@ -30,6 +31,7 @@ from thermoctl.signals import (
     ChooseController,
     Command,
     Event,
+    Load,
     ManualPower,
     Measurement,
     Mode,
@@ -74,6 +76,7 @@ class Regulator:
         self._shadow = Shadow(plan.shadow, limits.power_min, limits.power_max, self._emit)
         self._learning = Learning(plan.identifier, self._supervisor, self._guard)
         self._feasibility = Feasibility(plan.limits.period_s, self._supervisor.alarms, self._emit)
+        self._load = KnownLoad(self._emit)
         self._jump_k = plan.limits.jump_k
         self._t_s: float | None = None
         self._command = Command(0.0, -math.inf, "start")
@@ -111,14 +114,16 @@ class Regulator:
                 self._wishes.want_setpoint(value_c, rate_k_per_min)
             case ManualPower(power):
                 self._wishes.want_power(power)
+            case Load(power, duration_s):
+                self._load.want(power, duration_s, self._t_s or 0.0)
             case ChooseController(name):
                 self._choose(name)
             case Acknowledge(code):
                 self._supervisor.acknowledge(code)
             case _:
                 raise Refused(
-                    "expected a Mode, SetPoint, ManualPower, ChooseController or Acknowledge, got "
-                    f"{request!r}"
+                    "expected a Mode, SetPoint, ManualPower, Load, ChooseController or "
+                    f"Acknowledge, got {request!r}"
                 )
 
     def _choose(self, name: object) -> None:
@@ -156,7 +161,7 @@ class Regulator:
     def step(self, measurement: Measurement) -> Step:
         """Return what is made of `measurement`; never raises, whatever it holds."""
         t_s, interval_s = self._time(measurement.t_s)
-        applied = self._applied_power()
+        applied = self._applied_power() - self._load.mean(t_s, interval_s)
         verdict = self._supervisor.judge(measurement, t_s, interval_s, self._jump_k)
         temperature_c = float(measurement.temperature_c) if verdict is Verdict.GOOD else math.nan
         self._learning.observe(temperature_c, self._given(applied, interval_s), t_s)
@@ -175,7 +180,8 @@ class Regulator:
         self._steering.tell_remarks(t_s)
         self._command = self._supervisor.bound(asked, reason, t_s)
         steered = self._wishes.mode is Mode.AUTO and state is State.RUN
-        self._shadow.decide(situation, self._command.power, seen_s, steered=steered)
+        given = self._command.power - self._load.at(t_s)
+        self._shadow.decide(situation, given, seen_s, steered=steered)
         self._notice_unknown_power(t_s)
         self._applied = None
         return self._finish(measurement, situation, beliefs)
@@ -264,10 +270,13 @@ class Regulator:
         if not math.isfinite(situation.temperature_c):
             return 0.0, "unknown"
         asked = self._steering.decide(situation)
-        if state is State.RIDE and is_finite_number(asked):
+        if not is_finite_number(asked):
+            return asked, "control"
+        power, load = float(asked), self._load.at(situation.t_s)  # type: ignore[arg-type]
+        if state is State.RIDE:
             holding = self._limits.possible(beliefs.holding_power)
-            return _up_to(holding, float(asked)), "ride"  # type: ignore[arg-type]
-        return asked, "control"
+            return _up_to(holding, power) + load, "ride"
+        return power + load, "control"
 
     def _notice_unknown_power(self, t_s: float) -> None:
         if self._command.reason != "output.nan":
@@ -292,6 +301,7 @@ class Regulator:
             state=self._supervisor.state,
             setpoint_c=self._wishes.setpoint_c,
             reference_c=situation.setpoint_c,
+            load=self._load.at(situation.t_s),
             command=self._command,
             controller=self._steering.name,
             estimate=self._learning.estimate,

@@ -29,7 +29,7 @@ Identity = str | int | None
 
 @dataclass(frozen=True, slots=True)
 class _Argument:
-    """The one key of a call that is its own: its name, its type, and whether it may be left out."""
+    """A key of a call that is its own: its name, its type, and whether it may be left out."""
 
     name: str
     number: bool = False
@@ -37,16 +37,20 @@ class _Argument:
     optional: bool = False
 
 
-_ARGUMENTS: Final[Mapping[str, _Argument | None]] = {
-    "status": None,
-    "get": _Argument("key"),
-    "set": _Argument("value_c", number=True),
-    "mode": _Argument("mode"),
-    "output": _Argument("power", number=True),
-    "controller": _Argument("name"),
-    "alarms": None,
-    "ack": _Argument("code", optional=True),
-    "watch": _Argument("details", flag=True, optional=True),
+_ARGUMENTS: Final[Mapping[str, tuple[_Argument, ...]]] = {
+    "status": (),
+    "get": (_Argument("key"),),
+    "set": (
+        _Argument("value_c", number=True),
+        _Argument("rate_k_per_min", number=True, optional=True),
+    ),
+    "mode": (_Argument("mode"),),
+    "output": (_Argument("power", number=True),),
+    "load": (_Argument("power", number=True), _Argument("duration_s", number=True)),
+    "controller": (_Argument("name"),),
+    "alarms": (),
+    "ack": (_Argument("code", optional=True),),
+    "watch": (_Argument("details", flag=True, optional=True),),
 }
 
 
@@ -83,12 +87,13 @@ class CallError(ThermoctlError):
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """One call: what to do, for which loop, with which argument."""
+    """One call: what to do, for which loop, with which argument, and which `also`."""
 
     do: str
     call_id: Identity = None
     loop: str | None = None
     argument: str | float | bool | None = None
+    also: str | float | bool | None = None
 
 
 def error_words(error: Mapping[str, Any]) -> str:
@@ -154,13 +159,13 @@ def _call(keys: Mapping[str, Any], call_id: Identity) -> Call:
         raise CallError("bad_version", f'"v": {VERSION}', version)
     if not isinstance(do, str) or do not in _ARGUMENTS:
         raise CallError("unknown_call", f'"do" to be one of {", ".join(_ARGUMENTS)}', do)
-    argument = _ARGUMENTS[do]
-    known = ["v", "id", "do", "loop", *([argument.name] if argument else [])]
+    arguments = _ARGUMENTS[do]
+    known = ["v", "id", "do", "loop", *(each.name for each in arguments)]
     if unknown := sorted(keys.keys() - known):
         raise CallError("unknown_key", f"no keys but {', '.join(known)}", unknown[0])
     if loop is not None:
         loop = _text("loop", loop)
-    return Call(do, call_id, loop, None if argument is None else _value(argument, keys))
+    return Call(do, call_id, loop, *(_value(each, keys) for each in arguments))
 
 
 def _value(argument: _Argument, keys: Mapping[str, Any]) -> str | float | bool | None:

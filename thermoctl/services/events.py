@@ -80,6 +80,7 @@ _BY_LEVEL: Final = {
         "history.recovered",
         "latch.cleared",
         "latch.saved",
+        "load.changed",
         "loop.not_resumed",
         "loop.started",
         "loop.stopped",

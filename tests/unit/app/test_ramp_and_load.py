@@ -1,0 +1,94 @@
+"""Ramps and loads from the command line to the request, each word checked."""
+
+import json
+
+import pytest
+
+from thermoctl.app.clerk import Clerk
+from thermoctl.app.control_commands import _LOAD, _RATE
+from thermoctl.services.control_protocol import Call, CallError, asking, parse
+from thermoctl.signals import Load, SetPoint
+
+
+class Asked:
+    """A request the loop has granted."""
+
+    settled, refusal = True, None
+
+
+class Loop:
+    """Takes requests and grants them."""
+
+    def __init__(self):
+        self.requests = []
+
+    def ask(self, request, loop=None):
+        self.requests.append(request)
+        return Asked()
+
+
+def granted(call, tmp_path):
+    """Return the request that `call` became, and its reply."""
+    loop = Loop()
+    clerk = Clerk(loop, {}, {"tank": 1.0}, None, tmp_path, lambda: 0.0)
+    return loop.requests, clerk.answer(call)()
+
+
+@pytest.mark.parametrize(
+    ("text", "k_per_min"),
+    [("2/min", 2.0), ("2K/min", 2.0), ("0.5 K/min", 0.5), ("30/h", 0.5), ("30 °C/h", 0.5)],
+)
+def test_a_rate_has_its_unit(text, k_per_min):
+    assert _RATE.convert(text, None, None) == pytest.approx(k_per_min)
+
+
+@pytest.mark.parametrize("text", ["2", "2/s", "0/min", "-2/min", "fast", "1e9999/min", "2 W/min"])
+def test_a_rate_without_a_unit_that_is_known_is_refused(text):
+    with pytest.raises(Exception, match="expected a rate above 0"):
+        _RATE.convert(text, None, None)
+
+
+def test_a_load_may_be_negative():
+    assert _LOAD.convert("-10%", None, None) == pytest.approx(-0.1)
+    assert _LOAD.convert("0.2", None, None) == 0.2
+    with pytest.raises(Exception, match="expected a power"):
+        _LOAD.convert("120%", None, None)
+
+
+def test_a_call_has_its_rate_and_its_duration():
+    sent = asking(1, "set", {"value_c": 65.0, "rate_k_per_min": 2.0})
+    assert parse(sent) == Call("set", 1, None, 65.0, 2.0)
+    sent = asking(2, "set", {"value_c": 65.0, "rate_k_per_min": None})
+    assert parse(sent) == Call("set", 2, None, 65.0, None)
+    sent = asking(3, "load", {"power": 0.2, "duration_s": 600.0})
+    assert parse(sent) == Call("load", 3, None, 0.2, 600.0)
+
+
+@pytest.mark.parametrize(
+    ("keys", "code"),
+    [
+        ({"do": "set", "value_c": 65.0, "rate_k_per_min": "2/min"}, "bad_value"),
+        ({"do": "load", "power": 0.2}, "missing_key"),
+        ({"do": "load", "power": 0.2, "duration_s": True}, "bad_value"),
+        ({"do": "output", "power": 0.2, "duration_s": 1.0}, "unknown_key"),
+    ],
+)
+def test_a_call_that_is_half_right_is_refused_as_such(keys, code):
+    with pytest.raises(CallError) as refused:
+        parse(json.dumps({"v": 1, **keys}).encode())
+    assert refused.value.error["code"] == code
+
+
+def test_a_ramp_becomes_a_set_point_with_a_rate(tmp_path):
+    requests, reply = granted(Call("set", 1, None, 65.0, 2.0), tmp_path)
+    assert requests == [SetPoint(65.0, 2.0)]
+    assert reply == {"loop": "tank", "setpoint_c": 65.0, "rate_k_per_min": 2.0}
+    requests, reply = granted(Call("set", 1, None, 65.0), tmp_path)
+    assert requests == [SetPoint(65.0)]
+    assert "rate_k_per_min" not in reply
+
+
+def test_a_load_becomes_a_request(tmp_path):
+    requests, reply = granted(Call("load", 1, None, 0.2, 600.0), tmp_path)
+    assert requests == [Load(0.2, 600.0)]
+    assert reply == {"loop": "tank", "power": 0.2, "duration_s": 600.0}

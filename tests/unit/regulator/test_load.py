@@ -1,0 +1,96 @@
+"""A load that is known beforehand is met at once, by any law, and is learnt by none."""
+
+import math
+
+import pytest
+
+from thermoctl.errors import Refused
+from thermoctl.regulator.load import KnownLoad
+from thermoctl.signals import Load, Mode
+
+LOAD = 0.2
+
+
+def nothing(name, **fields):
+    """Take an event and keep nothing."""
+
+
+def lowest(drive, seconds, load):
+    """Return the least temperature while the plant loses `load` of full power more."""
+    low_c = drive.water_c
+    for _ in range(seconds):
+        drive.water_c -= 0.0449 * load
+        drive.step()
+        low_c = min(low_c, drive.water_c)
+    return low_c
+
+
+@pytest.mark.parametrize("controller", ["adaptive", {"kind": "pid", "gain_per_k": 0.4}])
+def test_the_dip_is_at_most_half_of_what_it_would_be(drive_with, controller):
+    dips = []
+    for announced in (False, True):
+        drive = drive_with(water_c=32.0, controller=controller)
+        drive.run(1200)
+        before_c = drive.water_c
+        if announced:
+            drive.regulator.request(Load(LOAD, 300.0))
+        dips.append(before_c - lowest(drive, 300, LOAD))
+    assert 0.0 < dips[1] < 0.5 * dips[0]
+
+
+def test_the_loss_that_was_learnt_is_not_disturbed(drive_with):
+    drive = drive_with(water_c=32.0)
+    drive.run(1200)
+    before = drive.steps[-1].plant.loss_k_per_s
+    drive.regulator.request(Load(LOAD, 600.0))
+    lowest(drive, 600, LOAD)
+    assert drive.steps[-1].plant.loss_k_per_s == pytest.approx(before, rel=0.15)
+    assert drive.steps[-1].beliefs.holding_power == pytest.approx(0.2, abs=0.04)
+
+
+def test_the_power_is_raised_in_the_same_step_and_lowered_when_the_time_is_over(warm):
+    before = warm.step().command.power
+    warm.regulator.request(Load(LOAD, 10.0))
+    step = warm.step()
+    assert step.command.power == pytest.approx(before + LOAD, abs=0.05)
+    assert step.load == LOAD
+    loads = [warm.step().load for _ in range(12)]
+    assert loads == [LOAD] * 8 + [0.0] * 4
+    told = [event for each in warm.steps for event in each.events if event.name == "load.changed"]
+    assert [dict(event.fields) for event in told] == [
+        {"power": LOAD, "duration_s": 10.0},
+        {"power": 0.0, "duration_s": 0.0},
+    ]
+
+
+def test_a_load_never_takes_the_power_beyond_its_limit(drive_with):
+    drive = drive_with(power_max=0.3)
+    drive.run(300)
+    drive.regulator.request(Load(1.0, 60.0))
+    assert drive.step().command.power == 0.3
+    drive.regulator.request(Load(-1.0, 60.0))
+    assert drive.step().command.power == 0.0
+
+
+def test_a_load_gives_no_power_where_none_is_allowed(warm):
+    warm.regulator.request(Load(LOAD, 600.0))
+    warm.regulator.request(Mode.OFF)
+    assert warm.step().command.power == 0.0
+
+
+@pytest.mark.parametrize("load", [(1.1, 60.0), (math.nan, 60.0), ("much", 60.0), (0.2, 0.0),
+                                  (0.2, -1.0), (0.2, math.inf), (True, 60.0)])  # fmt: skip
+def test_what_is_no_load_is_refused(warm, load):
+    with pytest.raises(Refused, match=r"expected a (load|duration)"):
+        warm.regulator.request(Load(*load))
+    assert warm.step().load == 0.0
+
+
+def test_the_mean_of_an_interval_counts_what_was_in_force():
+    load = KnownLoad(nothing)
+    load.want(0.4, 10.0, 100.0)
+    assert load.mean(100.0, 5.0) == 0.0
+    assert load.mean(105.0, 5.0) == pytest.approx(0.4)
+    assert load.mean(112.0, 4.0) == pytest.approx(0.2)
+    assert load.mean(120.0, 5.0) == 0.0
+    assert (load.at(109.9), load.at(110.0)) == (0.4, 0.0)
