@@ -2,14 +2,18 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from thermoctl.app.parts import plan_for
+from thermoctl.app.settings import load
 from thermoctl.control.gpc import SelfTuningGpc
 from thermoctl.estimation import start
 from thermoctl.ports import Controller, Foretelling, Situation
 
+AQUARIUM = Path(__file__).parents[3] / "config" / "aquarium.toml"
 NOTHING, EMPTY = start(1), np.empty(0)
 
 
@@ -270,6 +274,13 @@ def test_a_block_is_as_many_periods_as_come_next_to_its_length(period_s):
 # -- words ----------------------------------------------------------------------------------------
 
 
+def test_what_is_expected_counts_the_power_that_was_applied_meanwhile(settled):
+    belief, law = settled[0], SelfTuningGpc()
+    cold, hot = (law.surprise_k(belief, situation(37.5, power)) for power in (0.0, 1.0))
+    b1 = belief.learnt.theta[2]
+    assert cold - hot == pytest.approx(b1 / 10.0 * 11.0 / 20.0)  # its tenth, at the end of a block
+
+
 def test_it_says_by_how_much_a_reading_surprised_it(settled):
     belief, power = settled
     law, vessel, surprises = SelfTuningGpc(), resting(power), []
@@ -307,6 +318,16 @@ def test_it_says_by_how_much_a_reading_surprised_it(settled):
 def test_options_are_refused_by_name(bad, named):
     with pytest.raises(ValueError, match=f"^{named}$"):
         SelfTuningGpc(**bad)
+
+
+def test_a_loop_tells_it_period_gain_and_most_power_and_an_option_is_heard_first():
+    document = load(AQUARIUM).model_dump()
+    table = document["loops"]["tank"]
+    table.update(controller="self-tuning-gpc", shadow=None, power_max=0.6, period_s=2.0)
+    law = plan_for(load(document).loops["tank"]).controller
+    assert (law.period_s, law.gain_k_per_s, law.power_max) == (2.0, 0.0449, 0.6)
+    table["controller"] = {"kind": "self-tuning-gpc", "gain_k_per_s": 0.1}
+    assert plan_for(load(document).loops["tank"]).controller.gain_k_per_s == 0.1
 
 
 def test_nothing_of_it_can_be_changed(settled):

@@ -99,6 +99,15 @@ def test_poles_stay_inside_however_wild_the_readings_are():
         assert -0.1 <= MODEL.holding(belief.theta) <= 0.95 + 1e-12
 
 
+def test_a_loss_is_never_more_than_power_can_hold():
+    hopeless = TRUE + np.array([0.0] * 5 + [0.3])
+    belief = learnt(plant(moving(300), hopeless, noise_k=0.002))
+    assert MODEL.holding(belief.theta) == pytest.approx(0.95)
+    warming = TRUE - np.array([0.0] * 5 + [0.2])
+    belief = learnt(plant(moving(300), warming, noise_k=0.002))
+    assert MODEL.holding(belief.theta) == pytest.approx(-0.1, abs=0.002)
+
+
 def test_water_poured_in_is_not_taken_for_a_change_of_the_plant():
     before = learnt(plant(moving(300), noise_k=0.002))
     blocks = list(plant(moving(40, seed=6), noise_k=0.002))
