@@ -35,10 +35,8 @@ def simulated_run() -> LiveModel:
     clock, watch = SimulatedClock(), insights_for(settings.loops)[name]
 
     def take(cycle: Cycle) -> None:
-        news = watch.after(cycle.step, cycle.accepted_power)
+        watch.after(cycle.step, cycle.accepted_power)
         model.feed(cycle, watch.now)
-        for event in news:
-            model.note(event)
 
     loop = loop_for(settings, clock, take, beside=False)
     for number in range(int(DURATION_S / table.period_s) + 1):

@@ -12,7 +12,7 @@ import numpy as np
 from thermoctl.app.live.scale import Scale, range_for
 from thermoctl.app.live.sentences import Sentence, sentence
 from thermoctl.app.live.trend import Trend, TrendRecorder
-from thermoctl.insight import Insight, Row
+from thermoctl.insight import Change, Drift, Insight, Row
 from thermoctl.quantities import Array
 from thermoctl.signals import Beliefs, Cycle, Event, Mode, Quality, Step
 
@@ -29,6 +29,7 @@ STEERED = frozenset({Mode.AUTO, Mode.PROGRAM})
 """Modes in which the controller decides the power, and its model is judged."""
 
 STALE_PERIODS = 3.0
+CHANGED, DRIFT = "plant.changed", "plant.drift"
 _EVENTS_KEPT = 200
 _LARGEST = 1e9  # beyond it a number is a fault, and its square would soon overflow
 _NAN = math.nan
@@ -267,6 +268,8 @@ class LiveModel:
         self.facts = facts
         self._cycle: Cycle | None = None
         self._insight: Insight | None = None
+        self._changes: tuple[Change, ...] = ()
+        self._drifts: dict[str, Drift] = {}
         self._last_good_s = _NAN
         self._first_s = _NAN
         self._recorder = TrendRecorder(facts.period_s)
@@ -308,7 +311,28 @@ class LiveModel:
             (_known(step.estimate.inflation), followed_c, *_believed(step, insight)),
         )
         for event in step.events:
-            self.note(event)
+            if insight is None or event.name not in (CHANGED, DRIFT):
+                self.note(event)
+        if insight is not None:
+            self._note_news(step.t_s, insight)
+
+    def _note_news(self, t_s: float, insight: Insight) -> None:
+        """Take changes and drifts that are new, dated; whoever joins late has the last ones too.
+
+        They are in the journal of a daemon as well, but not among the events of its cycles.
+        """
+        for change in reversed(insight.changes):
+            if change not in self._changes:
+                self.note(Event(change.t_s, CHANGED, {"text": change.text}))
+        self._changes = insight.changes
+        now = {drift.name: drift for drift in insight.drifts}
+        for name, drift in now.items():
+            if name not in self._drifts:
+                self.note(Event(drift.since_s, DRIFT, {"active": True, "text": drift.text}))
+        for name, drift in self._drifts.items():
+            if name not in now:
+                self.note(Event(t_s, DRIFT, {"active": False, "text": drift.text}))
+        self._drifts = now
 
     def note(self, event: Event) -> None:
         """Take an event that came by another way than a step."""

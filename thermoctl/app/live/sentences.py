@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -130,17 +129,10 @@ def sentence(event: Event) -> Sentence:
         mark = _STATE_MARKS.get(fields.get("after", ""), mark)
     elif event.name == "plant.drift" and event.fields.get("active") is False:
         mark, templates = Mark.NONE, ("No longer: {text}", "The plant is as it was")
-    t_s = event.t_s - _dated_back_s(event)
     for template in templates:
         try:
             words = template.format_map(fields)
-            return Sentence(t_s, event.name, words[:1].upper() + words[1:], mark)
+            return Sentence(event.t_s, event.name, words[:1].upper() + words[1:], mark)
         except KeyError:
             continue
-    return Sentence(t_s, event.name, _described(event, fields), mark)
-
-
-def _dated_back_s(event: Event) -> float:
-    """Return how long before it was noticed the change began, in s."""
-    ago = event.fields.get("began_s_ago", 0.0)
-    return float(ago) if isinstance(ago, int | float) and 0.0 < ago < math.inf else 0.0
+    return Sentence(event.t_s, event.name, _described(event, fields), mark)

@@ -10,7 +10,7 @@ from thermoctl.app.live.look import Colour, Look
 from thermoctl.app.live.model import LiveModel, View
 from thermoctl.app.live.render import render
 from thermoctl.app.live.score import shadow_words
-from thermoctl.insight import Gate, Insight, Limit, Performance, Row
+from thermoctl.insight import Change, Drift, Gate, Insight, Limit, Performance, Row
 from thermoctl.signals import Alarm, Cycle, Event, Feasible, Mode, ShadowScore
 
 MakeCycle = Callable[..., Cycle]
@@ -257,25 +257,28 @@ def test_a_power_below_zero_has_a_strip_of_both_signs_and_a_name_of_its_own(
     assert "STALE since 14:00:59 · cooler 50.0 %" in stale[0]
 
 
-def test_a_change_of_the_plant_is_drawn_where_it_began(
+def test_a_change_of_the_plant_is_drawn_where_it_began_and_told_once(
     model: LiveModel, make_cycle: MakeCycle
 ) -> None:
-    fed(model, make_cycle(0.0), INSIGHT)
-    fields = {"kind": "step.loss", "text": "step loss of 3.1 ± 0.2 K", "began_s_ago": 20.0}
-    model.note(Event(50.0, "plant.changed", fields))
-    rows = texts(model.view(59.0))
+    late = Event(50.0, "plant.changed", {"text": "step loss of 3.1 ± 0.2 K"})
+    cycle = make_cycle(0.0)
+    view = fed(model, cycle, replace(INSIGHT, changes=(changed("step loss of 3.1 ± 0.2 K"),)))
+    model.feed(make_cycle(60.0, events=(late,)), view.insight)
+    rows = texts(model.view(60.0))
     assert any("14:00 Step loss of 3.1 ± 0.2 K" in row for row in rows[3:9])
-    assert any(row.startswith("14:00:30  ◆ Step loss") for row in rows)
+    assert [row[:22] for row in rows if "◆" in row] == ["14:00:30  ◆ Step loss "]
+
+
+def changed(text: str) -> Change:
+    return Change(30.0, "step.loss", -3.1, 0.2, "K", text)
 
 
 def test_a_change_with_little_room_beside_it_is_named_by_its_first_words(
     model: LiveModel, make_cycle: MakeCycle
 ) -> None:
-    fed(model, make_cycle(0.0), INSIGHT)
     text = "step loss of 3.1 ± 0.2 K, 106 kJ, about 1.0 kg of water of 10 °C or 0.2 kg of ice"
-    model.note(Event(50.0, "plant.changed", {"text": text}))
-    rows = texts(model.view(59.0), 80, 24)[3:7]
-    assert any("14:00 Step loss of 3.1 ± 0.2 K ┊" in row for row in rows)
+    view = fed(model, make_cycle(0.0), replace(INSIGHT, changes=(changed(text),)))
+    assert any("14:00 Step loss of 3.1 ± 0.2 K ┊" in row for row in texts(view, 80, 24)[3:7])
 
 
 def test_without_braille_there_is_no_spark_that_says_nothing(
@@ -286,11 +289,10 @@ def test_without_braille_there_is_no_spark_that_says_nothing(
 
 
 def test_a_drift_is_a_warning_until_it_is_gone(model: LiveModel, make_cycle: MakeCycle) -> None:
-    fed(model, make_cycle(0.0), INSIGHT)
-    for t_s, active in ((10.0, True), (20.0, False)):
-        fields = {"drift": "water.low", "active": active, "text": "less water"}
-        model.note(Event(t_s, "plant.drift", fields))
-    rows = texts(model.view(59.0))
+    drift = Drift("water.low", 10.0, "less water", 1.0, 1.3, 6.0)
+    fed(model, make_cycle(0.0), replace(INSIGHT, drifts=(drift,)))
+    model.feed(make_cycle(60.0), INSIGHT)
+    rows = texts(model.view(60.0))
     assert any(row.startswith("14:00:10  △ Less water") for row in rows)
-    assert any(row.startswith("14:00:20    No longer: less water") for row in rows)
-    assert math.isfinite(model.view(59.0).age_s)
+    assert any(row.startswith("14:01:00    No longer: less water") for row in rows)
+    assert sum("ess water" in row and "plant.drift" in row for row in rows) == 2
