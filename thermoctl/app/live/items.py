@@ -73,7 +73,7 @@ class Bench:
         return self.drawn(braille.envelope(*braille.joined(level, level), _DOTS))
 
     def drawn(self, dots: braille.Dots) -> str:
-        """Return `dots`, one cell high; nothing without braille, where they would say nothing."""
+        """Return `dots`, one cell high; nothing where there is no braille."""
         return braille.cells(dots, utf8=True)[0] if self.look.utf8 else ""
 
     def columns(self) -> Array:
