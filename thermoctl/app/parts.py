@@ -29,6 +29,7 @@ from thermoctl.model import sensor as curves
 from thermoctl.model.arx import Arx, KnownGain
 from thermoctl.ports import Controller, Estimator
 from thermoctl.regulator import Limits, Plan
+from thermoctl.regulator.heater_watch import HeaterCheck
 
 HEAT, COOL, HEAT_COOL = "heat", "cool", "heat-cool"
 
@@ -69,6 +70,7 @@ def plan_for(table: LoopTable) -> Plan:
             table.mode,
             shadow,
             table.setpoint_rate_k_per_s,
+            _heater_check(table, controller),
         )
 
 
@@ -153,6 +155,16 @@ def _within(name: str, table: BaseModel) -> Iterator[None]:
     except ValueError as error:
         blamed = plugins.blamed(error, type(table).model_fields)
         raise BadOption(blamed.text, above + blamed.path) from error
+
+
+def _heater_check(table: LoopTable, controller: Controller) -> HeaterCheck | None:
+    """Return how the heater is checked; not with a cooler beside it, nor without an output."""
+    check = table.heater_check
+    drives = table.actuator is None or isinstance(table.actuator, ActuatorTable)
+    if not check.enabled or table.cooler is not None or not drives:
+        return None
+    cools = action_of(controller) == COOL
+    return HeaterCheck(check.weakest_k_per_s, check.first_heat_s, "cool" if cools else "heat")
 
 
 def _limits(table: LoopTable, controller: Controller) -> Limits:

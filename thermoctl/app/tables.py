@@ -195,6 +195,24 @@ class ModelTable(Table):
         return self
 
 
+class HeaterCheckTable(Table):
+    """Table ``[loops.NAME.heater_check]``: whether the reading answers to the power."""
+
+    enabled: bool = Field(
+        True, description="Compare them, and ask a heater in doubt by cutting its power."
+    )
+    weakest_k_per_s: Annotated[float, Field(ge=1e-6, le=0.5)] = Field(
+        6e-5,
+        description="Least rise at full power, in K/s, that a healthy plant can have; 50 W in 200 "
+        "l have 6e-5. The more is said here, the less a heater that was never seen to heat may "
+        "give before it is called a fault.",
+    )
+    first_heat_s: Annotated[float, Field(ge=10.0, le=3600.0)] = Field(
+        60.0,
+        description="Seconds of full power in which such a heater has to show a rise, or is asked.",
+    )
+
+
 class OrdersTable(Table):
     """Table ``[loops.NAME.orders]``: orders weighed beside the loop."""
 
@@ -277,6 +295,8 @@ class LoopTable(Table):
     orders: OrdersTable | None = Field(
         None, description="Table of the orders that are weighed beside the loop; none when absent."
     )
+
+    heater_check: HeaterCheckTable = Field(default_factory=HeaterCheckTable)
 
     @field_validator("controller", "shadow", mode="before")
     @classmethod

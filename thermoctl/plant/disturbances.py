@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from thermoctl.plant.parameters import REFERENCE_L, require
+from thermoctl.plant.power_stage import Output
 from thermoctl.plant.probe import Wiring
 from thermoctl.plant.tank import Tank
 
 SAG_S = 60.0
 DRAUGHT_S = 300.0
+FOREVER_S = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +122,27 @@ def _rewiring(wiring: Wiring) -> Callable[[Tank, float], str]:
     return apply
 
 
+def _failing(output: Output) -> Callable[[Tank, float], str]:
+    """Return a disturbance that lets the heater do something else for some seconds."""
+
+    def apply(tank: Tank, duration_s: float) -> str:
+        tank.stage.fail(output, duration_s)
+        return f"heater {output.value} for {duration_s:.3g} s"
+
+    return apply
+
+
+def _sensor_out(tank: Tank, duration_s: float) -> str:
+    room_c = tank.parameters.room.temperature_c
+    tank.probe.leave(room_c, duration_s)
+    return f"sensor out of the tank, in air of {room_c:.3g} degC, for {duration_s:.3g} s"
+
+
+def _sensor_stuck(tank: Tank, duration_s: float) -> str:
+    tank.probe.leave(math.nan, duration_s)
+    return f"sensor stands still for {duration_s:.3g} s"
+
+
 DISTURBANCES: Mapping[str, Disturbance] = {
     "cold-water": Disturbance("pour cold water", "l", 1.0, 0.0, 8.0, _pour, growth=1.0),
     "ice": Disturbance("throw ice in", "kg", 0.3, 0.0, 4.0, _throw_ice, growth=1.0),
@@ -131,5 +155,18 @@ DISTURBANCES: Mapping[str, Disturbance] = {
     "dropout": Disturbance("no samples", "s", 15.0, 0.0, 1e6, _rewiring(Wiring.MISSING)),
     "open": Disturbance("broken wire", "s", 15.0, 0.0, 1e6, _rewiring(Wiring.OPEN)),
     "short": Disturbance("shorted wire", "s", 15.0, 0.0, 1e6, _rewiring(Wiring.SHORT)),
+    "sensor-out": Disturbance("sensor falls out", "s", FOREVER_S, 0.0, FOREVER_S, _sensor_out),
+    "sensor-stuck": Disturbance(
+        "reading stands still", "s", FOREVER_S, 0.0, FOREVER_S, _sensor_stuck
+    ),
+    "element-dead": Disturbance(
+        "heater gives nothing", "s", FOREVER_S, 0.0, FOREVER_S, _failing(Output.DEAD)
+    ),
+    "inverted": Disturbance(
+        "power cools", "s", FOREVER_S, 0.0, FOREVER_S, _failing(Output.INVERTED)
+    ),
+    "stuck-on": Disturbance(
+        "heater always on", "s", FOREVER_S, 0.0, FOREVER_S, _failing(Output.STUCK_ON)
+    ),
 }
 """Every disturbance by name."""

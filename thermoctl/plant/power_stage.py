@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from enum import Enum
 
 from numpy.random import Generator
 
@@ -17,6 +18,27 @@ STAGES: Mapping[str, ActuatorLaw] = {
     "burst": WholeCycleBurst(50),
 }
 """Power stages by name; the burst repeats after 50 mains cycles, one second of 50 Hz."""
+
+
+class Output(Enum):
+    """What becomes of the power that is asked for."""
+
+    SOUND = "sound"
+    DEAD = "dead"
+    INVERTED = "inverted"
+    STUCK_ON = "stuck on"
+
+    def given(self, power: float) -> float:
+        """Return what reaches the water, as a fraction; negative where power cools."""
+        match self:
+            case Output.SOUND:
+                return power
+            case Output.DEAD:
+                return 0.0
+            case Output.INVERTED:
+                return -power
+            case Output.STUCK_ON:
+                return 1.0
 
 
 class PowerStage:
@@ -41,6 +63,12 @@ class PowerStage:
         self._t_s = 0.0
         self._sag = 0.0
         self._sag_until_s = 0.0
+        self._output, self._output_until_s = Output.SOUND, 0.0
+
+    @property
+    def output(self) -> Output:
+        """What becomes of the power at this time."""
+        return self._output if self._t_s < self._output_until_s else Output.SOUND
 
     @property
     def mains(self) -> float:
@@ -52,9 +80,17 @@ class PowerStage:
         """Lower the mains by the fraction `depth` for `duration_s`."""
         self._sag, self._sag_until_s = depth, self._t_s + duration_s
 
+    def fail(self, output: Output, duration_s: float) -> None:
+        """Let the output do what `output` says for `duration_s`."""
+        self._output, self._output_until_s = output, self._t_s + duration_s
+
     def advance(self, step_s: float, drive: float) -> float:
-        """Return the power in W during the next `step_s` at `drive`, in [0, 1]."""
-        heater_w = self._rated_w * self._law.power_from(drive) * self.mains**2
+        """Return the power in W during the next `step_s` at `drive`, in [0, 1].
+
+        Negative where the output is inverted.
+        """
+        given = self.output.given(self._law.power_from(drive))
+        heater_w = self._rated_w * given * self.mains**2
         self._t_s += step_s
         self._unrest.advance(step_s)
         return heater_w

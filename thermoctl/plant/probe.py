@@ -12,6 +12,9 @@ from thermoctl.model.sensor import LM335
 from thermoctl.plant.noise import Normals, Wander
 from thermoctl.plant.parameters import Probe
 
+IN_AIR = 8.0
+"""A sheath in still air follows so many times more slowly than in stirred water."""
+
 
 class Wiring(Enum):
     """How the sensor is connected just now."""
@@ -50,6 +53,8 @@ class ProbeInTank:
         self._spike_k = 0.0
         self._wiring = Wiring.SOUND
         self._wiring_until_s = 0.0
+        self._away: float | None = None
+        self._away_until_s = 0.0
 
     @property
     def sheath_c(self) -> float:
@@ -70,9 +75,24 @@ class ProbeInTank:
         met_c = self._arriving(self._t_s - delay_s) + self._turbulence.advance(step_s)
         if step_s != self._step_s:
             self._step_s, self._follow = step_s, -math.expm1(-step_s / probe.lag_s)
+        if self._away is not None:
+            self._rest_away(step_s, self._away)
+            return
         # The exact answer of a first-order lag to the mean of both ends of the step.
         self._sheath_c += self._follow * (0.5 * (self._met_c + met_c) - self._sheath_c)
         self._met_c = met_c
+
+    def _rest_away(self, step_s: float, there_c: float) -> None:
+        """Follow what is around the sheath outside the tank, if anything is."""
+        if math.isfinite(there_c):
+            follow = -math.expm1(-step_s / (IN_AIR * self._parameters.lag_s))
+            self._sheath_c += follow * (there_c - self._sheath_c)
+        if self._t_s >= self._away_until_s:
+            self._away, self._met_c = None, self._past[-1][1]
+
+    def leave(self, there_c: float, duration_s: float) -> None:
+        """Lie outside the tank, where it has `there_c`, for `duration_s`; NaN: stand still."""
+        self._away, self._away_until_s = there_c, self._t_s + duration_s
 
     def _arriving(self, left_s: float) -> float:
         """Return the temperature of the water that left the heater at `left_s`."""

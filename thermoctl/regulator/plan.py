@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from thermoctl.estimation.identifier import Identifier
 from thermoctl.ports import Controller
+from thermoctl.regulator.heater_watch import HeaterCheck
 from thermoctl.regulator.limits import Limits
 from thermoctl.signals import Mode
 
@@ -29,6 +30,8 @@ class Plan:
         Mode at the start.
     shadow : Controller, optional
         Another law, asked beside the one in charge and not obeyed until it is put in charge.
+    heater_check : HeaterCheck, optional
+        How the heater is checked against what it was seen to do; not at all when not given.
     setpoint_rate_k_per_s : float
         How fast a set point is approached, at most; infinite: at once.
 
@@ -46,6 +49,7 @@ class Plan:
     mode: Mode = Mode.OFF
     shadow: Controller | None = None
     setpoint_rate_k_per_s: float = math.inf
+    heater_check: HeaterCheck | None = None
 
     def __post_init__(self) -> None:
         if self.mode is Mode.PROGRAM:

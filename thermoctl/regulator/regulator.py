@@ -14,6 +14,7 @@ from thermoctl.ports import Remembered, Situation
 from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.feasible import Feasibility, Wanted
 from thermoctl.regulator.guard import Guard
+from thermoctl.regulator.heater_watch import HeaterWatch
 from thermoctl.regulator.judge import Verdict
 from thermoctl.regulator.learning import Learning
 from thermoctl.regulator.load import KnownLoad
@@ -77,6 +78,10 @@ class Regulator:
         self._learning = Learning(plan.identifier, self._supervisor, self._guard)
         self._feasibility = Feasibility(plan.limits.period_s, self._supervisor.alarms, self._emit)
         self._load = KnownLoad(self._emit)
+        self._watch: HeaterWatch | None = None
+        if plan.heater_check is not None:
+            period_s = plan.limits.period_s
+            self._watch = HeaterWatch(plan.heater_check, period_s, self._supervisor, self._emit)
         self._jump_k = plan.limits.jump_k
         self._t_s: float | None = None
         self._command = Command(0.0, -math.inf, "start")
@@ -165,6 +170,8 @@ class Regulator:
         verdict = self._supervisor.judge(measurement, t_s, interval_s, self._jump_k)
         temperature_c = float(measurement.temperature_c) if verdict is Verdict.GOOD else math.nan
         self._learning.observe(temperature_c, self._given(applied, interval_s), t_s)
+        if self._watch is not None:
+            self._watch.observe(t_s, interval_s, temperature_c, applied)
         seen_s = self._limits.seen_s(interval_s)
         self._learning.hold(temperature_c - self._wishes.setpoint_c, applied, seen_s)
         reference = self._wishes.approach(temperature_c, seen_s, self._supervisor.state)
@@ -259,6 +266,8 @@ class Regulator:
         """Return the power that mode, state and controller ask for, and who asked."""
         if self._wishes.mode is Mode.OFF:
             return 0.0, "off"
+        if self._watch is not None and self._watch.asks:
+            return 0.0, "heater.check"
         if state is State.HOLD:
             held = self._supervisor.last_power
             manual = self._wishes.mode is Mode.MANUAL

@@ -32,11 +32,15 @@ _BY_LEVEL: Final = {
         "cycle.failed",
         "feed.failed",
         "estimator.failed",
+        "heater.no_response",
+        "heater.reversed",
+        "heater.stuck_on",
         "output.nan",
         "output.readback",
         "output.refused",
         "sensor.open",
         "sensor.short",
+        "sensor.stuck",
         "socket.failed",
     ),
     "warning": (
@@ -50,6 +54,7 @@ _BY_LEVEL: Final = {
         "cycle.missed",
         "estimator.rejected",
         "estimator.reset",
+        "heater.questioned",
         "history.drops",
         "history.failed",
         "history.set_aside",
@@ -77,6 +82,7 @@ _BY_LEVEL: Final = {
         "controller.resumed",
         "controller.tuned",
         "controller.tuning",
+        "heater.answered",
         "history.recovered",
         "latch.cleared",
         "latch.saved",
@@ -105,6 +111,7 @@ EVENTS: Final[Mapping[str, str]] = MappingProxyType(
 
 REASONS: Final = frozenset(
     {
+        "heater.check",
         "limit.changeover",
         "limit.high",
         "limit.low",

@@ -22,7 +22,12 @@ from thermoctl.signals import (
     State,
 )
 
-TABLE = {"setpoint_c": 37.5, "trip_above_c": 60.0, "mode": "auto"}
+TABLE = {
+    "setpoint_c": 37.5,
+    "trip_above_c": 60.0,
+    "mode": "auto",
+    "heater_check": {"enabled": False},
+}
 SITUATION = Situation(
     0.0, 1.0, 37.5, 37.5, 0.2, Estimate(np.ones(1), np.eye(1)), np.array([37.5]), np.array([0.2])
 )

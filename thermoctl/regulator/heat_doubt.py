@@ -1,0 +1,155 @@
+r"""How far the reading lags behind what the applied power should have done to it, or runs ahead.
+
+The model is what was known some minutes ago: it must not follow a fault at once, or it would
+explain everything away. With the mean rate of heat and reading in quiet times the loss is
+
+.. math:: d = \beta \bar q - \bar{\dot y}
+
+whatever the gain is believed to be. In each block the rise that is missing is what the heat brought
+less what the reading rose, less the loss. Two sums are kept as in a CUSUM test, one of what is
+missing beyond half of the heat, one of what came beyond two and a half times the heat. Both count
+no more in a block than a heater could do, so that a litre of cold water is soon paid back.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from thermoctl.quantities import Array, clamp
+from thermoctl.regulator.heat_response import LAGS_S, Block, Gain
+
+LEAST_K, SDS, LAGS = 0.3, 5.0, 1.0
+"""A sum is a doubt beyond these: in K, in standard deviations of a reading, in rises of a lag."""
+EXTRA_LAGS = 0.6
+CALM = 0.1
+"""Below this share of its limit a sum is nothing, and the model may follow."""
+HALF = 0.5
+"""So much of the heat may be missing: the gain of a tank whose water was doubled."""
+FULL_SHARE = 0.02
+"""And so much of full power: loss that wanders."""
+EXTRA_GAINS, EXTRA_SHARE = 2.5, 0.3
+"""So many times the gain, and so much of full power besides, is no stuck output."""
+MEMORY_S, MEMORY_LAGS = 300.0, 10.0
+"""Memory of the quiet rates."""
+SLOW_S = 3600.0
+"""Memory of the loss as it was."""
+CREPT, CREPT_S, CREPT_FROM_S = 0.2, 100.0, 600.0
+"""A loss that has grown by so much of full power, for so long: a reading that stands still makes a
+controller add power little by little, and looks like a plant that loses ever more."""
+SETTLE_S = 300.0
+"""After a jump it is not known what the plant does without power."""
+
+
+class Seen(NamedTuple):
+    """Reading in degC and heat under every lag in s, at a time in s."""
+
+    t_s: float
+    reading_c: float
+    heat_s: Array
+
+
+class HeatDoubt:
+    """Compares readings with what they should be.
+
+    Attributes
+    ----------
+    since : Seen or None
+        Where what is missing began to add up.
+    """
+
+    def __init__(self) -> None:
+        self._rates: Array = np.zeros(len(LAGS_S))
+        self._rise_rate = 0.0
+        self._known_s = 0.0
+        self._slow_loss = 0.0
+        self._settle_s = 0.0
+        self.since: Seen | None = None
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin the sums anew; what is known of the quiet plant stays."""
+        self._missing_k = self._extra_k = self._crept_s = 0.0
+        self.since = None
+
+    def trust(self, gain: Gain) -> None:
+        """Take the loss for what it is now: the heater was asked, and answers."""
+        self._slow_loss = self.loss(gain)
+
+    def loss(self, gain: Gain) -> float:
+        """Return how fast the reading should fall without power, in K/s."""
+        return gain.mean * float(self._rates[gain.place]) - self._rise_rate
+
+    def calm(self, gain: Gain, sd_k: float) -> bool:
+        """Return whether nothing is in doubt, so that gain and loss may be learnt."""
+        return max(self._missing_k, self._extra_k) < CALM * _limit_k(gain, sd_k, LAGS)
+
+    def cold(self, gain: Gain, sd_k: float) -> bool:
+        """Return whether the reading fails to answer to the power."""
+        return self._missing_k > _limit_k(gain, sd_k, LAGS) or self._crept_s > CREPT_S
+
+    def hot(self, gain: Gain, sd_k: float) -> bool:
+        """Return whether the reading rises beyond what any power explains."""
+        return self._extra_k > _limit_k(gain, sd_k, EXTRA_LAGS)
+
+    def compare(
+        self, gain: Gain, block: Block, before: Seen, now: Seen, *, jumped: bool, follow: bool
+    ) -> None:
+        """Add what happened from `before` to `now`; quiet rates `follow` if they may."""
+        span_s, rise_k = now.t_s - before.t_s, now.reading_c - before.reading_c
+        heat_s = now.heat_s - before.heat_s
+        heat_k, full_k = gain.mean * float(heat_s[gain.place]), gain.mean * span_s
+        loss_k = self.loss(gain) * span_s
+        missing_k = clamp(heat_k - loss_k - rise_k, -2.0 * full_k, heat_k)
+        missing_k += self._missing_k - HALF * heat_k - FULL_SHARE * full_k
+        if self._missing_k == 0.0:
+            self.since = before
+        self._missing_k = max(0.0, missing_k)
+        self._settle_s = SETTLE_S if jumped else self._settle_s - span_s
+        if self._settle_s <= 0.0:
+            extra_k = rise_k + min(loss_k, 0.0) - EXTRA_GAINS * heat_k
+            extra_k = clamp(extra_k, -full_k, full_k) - EXTRA_SHARE * full_k
+            self._extra_k = max(0.0, self._extra_k + extra_k)
+        if follow and not jumped and self.calm(gain, block.sd_k):
+            rise_k = clamp(rise_k, -full_k, full_k)
+            self._follow(gain, heat_s / span_s, rise_k / span_s, span_s)
+        self._creep(gain, span_s)
+
+    def _follow(self, gain: Gain, rates: Array, rise_rate: float, span_s: float) -> None:
+        """Let the quiet rates follow those of a block."""
+        self._known_s += span_s
+        memory_s = max(MEMORY_S, MEMORY_LAGS * gain.lag_s)
+        share = span_s / min(self._known_s, memory_s)
+        self._rates = self._rates + share * (rates - self._rates)
+        self._rise_rate += share * (rise_rate - self._rise_rate)
+        slow = span_s / min(self._known_s, max(SLOW_S, memory_s))
+        self._slow_loss += slow * (self.loss(gain) - self._slow_loss)
+
+    def _creep(self, gain: Gain, span_s: float) -> None:
+        grown = self.loss(gain) - self._slow_loss
+        crept = self._known_s > CREPT_FROM_S and grown > CREPT * gain.mean
+        self._crept_s = self._crept_s + span_s if crept else 0.0
+
+    def told(self, gain: Gain, now: Seen) -> str:
+        """Return what was expected since the doubt began, and what came."""
+        since, loss = self.since, self.loss(gain)
+        if self._crept_s > CREPT_S:
+            grown, before = loss / gain.mean, self._slow_loss / gain.mean
+            return f"expected a loss near {before:.0%} of full power, got {grown:.0%}"
+        if since is None or not now.t_s > since.t_s:
+            return "expected a reading that answers to the power"
+        span_s = now.t_s - since.t_s
+        heat_s = float(now.heat_s[gain.place] - since.heat_s[gain.place])
+        expected_k = gain.mean * heat_s - loss * span_s
+        sd_k = math.hypot((gain.sd + 0.1 * gain.mean) * heat_s, 0.1 * gain.stored_k)
+        return (
+            f"expected {expected_k:+.2f} +-{sd_k:.2f} K in {span_s:.0f} s at "
+            f"{heat_s / span_s:.0%} power, got {now.reading_c - since.reading_c:+.2f} K"
+        )
+
+
+def _limit_k(gain: Gain, sd_k: float, lags: float) -> float:
+    """Return the sum in K from which on it is a doubt."""
+    return max(LEAST_K, SDS * sd_k, lags * gain.stored_k)

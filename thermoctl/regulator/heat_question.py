@@ -1,0 +1,124 @@
+r"""The question that is put to a heater in doubt: what does the reading do without power?
+
+To cut the power is always safe, and it tells what watching cannot: whatever cools or warms the
+reading besides goes on as before, and only the heater's part ends. The answer is the gain beta in
+
+.. math:: y = a + b\,t + c\,t^2 + \beta H_j(t)
+
+over some time with power and some without, for every lag j of `heat_response`. The parabola takes
+up a plant that cools towards its surroundings. What it cannot take up leaves remainders that
+resemble their neighbours, and the error of beta is enlarged for that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from thermoctl.quantities import Array
+from thermoctl.regulator.heat_doubt import Seen
+from thermoctl.regulator.heat_response import LAGS_S, Gain
+
+ROWS_LEAST = 6
+SURE = 4.0
+"""A gain differs from nothing at so many standard deviations."""
+ANSWERS, NOTHING = 0.35, 0.3
+"""Of the known gain: so much is an answer, of whatever sign, and less than that is none."""
+RULED_OUT = 2.0
+"""A gain is ruled out so many standard deviations away."""
+USELESS = 0.1
+"""A heater that does not make up for this share of the loss has no use that anybody could see."""
+WORTH_MOST = 0.95
+CAUTION = 1.5
+
+
+class Answer(Enum):
+    """What the reading said."""
+
+    OPEN = "open"
+    HEATS = "heats"
+    NOTHING = "nothing"
+    COOLS = "cools"
+
+
+class Contrast(NamedTuple):
+    """Gain in K/s for each lag, its standard deviation, and the variance that is left over."""
+
+    mean: Array
+    sd: Array
+    left: Array
+
+    def best(self, places: Iterable[int]) -> Gain:
+        """Return the gain under that lag of `places` which leaves the least over."""
+        place = min(places, key=lambda each: float(self.left[each]))
+        return Gain(float(self.mean[place]), float(self.sd[place]), place)
+
+
+def contrast(rows: Sequence[Seen], sd_k: float) -> Contrast | None:
+    """Return the gain that `rows` show, by least squares; None for too few of them."""
+    n = len(rows)
+    if n < ROWS_LEAST:
+        return None
+    t = np.array([row.t_s for row in rows])
+    t = t - t.mean()
+    free = np.linalg.qr(np.column_stack((np.ones(n), t, t * t)))[0]
+    y = np.array([row.reading_c for row in rows])
+    heat = np.array([row.heat_s for row in rows])
+    y, heat = y - free @ (free.T @ y), heat - free @ (free.T @ heat)
+    heats = np.maximum((heat * heat).sum(axis=0), 1e-12)
+    mean = y @ heat / heats
+    rest = y[:, None] - heat * mean
+    squares = np.maximum((rest * rest).sum(axis=0), 1e-30)
+    alike = np.clip((rest[1:] * rest[:-1]).sum(axis=0) / squares, 0.0, WORTH_MOST)
+    left = squares / max(n - 4, 1)
+    variance = np.maximum(left * (1.0 + alike) / (1.0 - alike), sd_k * sd_k)
+    return Contrast(mean, CAUTION * np.sqrt(variance / heats), left)
+
+
+def of_known(found: Contrast, known: Gain) -> tuple[Answer, Gain]:
+    """Return what `found` says of a heater whose gain was known, and the gain it shows."""
+    last = len(LAGS_S) - 1
+    near = range(max(known.place - 1, 0), min(known.place + 1, last) + 1)
+    shown = found.best(near)
+    if abs(shown.mean) > max(ANSWERS * known.mean, SURE * shown.sd):
+        return (Answer.HEATS if shown.mean > 0.0 else Answer.COOLS), shown
+    small = [abs(found.mean[place]) < NOTHING * known.mean for place in near]
+    sure = [SURE * found.sd[place] < known.mean for place in near]
+    return (Answer.NOTHING if all(small) and all(sure) else Answer.OPEN), shown
+
+
+def of_unknown(found: Contrast, weakest: float, slope: float) -> tuple[Answer, Gain]:
+    """Return what `found` says of an unknown heater, and the gain it shows.
+
+    Parameters
+    ----------
+    found : Contrast
+        What was seen.
+    weakest : float
+        Least gain a healthy plant can have, in K/s.
+    slope : float
+        How fast the reading drifts by itself, in K/s.
+    """
+    shown = found.best(range(len(LAGS_S)))
+    useless = USELESS * abs(slope)
+    if shown.mean > SURE * shown.sd:
+        return Answer.HEATS, shown
+    if shown.mean < -max(SURE * shown.sd, useless):
+        return Answer.COOLS, shown
+    most = float((np.abs(found.mean) + RULED_OUT * found.sd).max())
+    return (Answer.NOTHING if most < max(weakest, useless) else Answer.OPEN), shown
+
+
+def slope(rows: Iterable[Seen], from_s: float, to_s: float = math.inf) -> float:
+    """Return how fast the reading moved, in K/s; NaN for less than 3 rows."""
+    meant = [row for row in rows if from_s <= row.t_s <= to_s]
+    if len(meant) < 3:
+        return math.nan
+    t = np.array([row.t_s for row in meant])
+    t = t - t.mean()
+    y = np.array([row.reading_c for row in meant])
+    return float(t @ y / (t @ t))

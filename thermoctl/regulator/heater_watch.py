@@ -1,0 +1,333 @@
+"""Whether the reading answers to the power, and what is done when it does not.
+
+A heater that is known is watched by `HeatDoubt`. One that is not yet known has so many seconds of
+full power to show a rise. Whoever is in doubt is asked: the power is cut for some lags, whatever
+the controller wants, and `heat_question` reads the answer. None, or the wrong one, is SAFE, and for
+the second time LATCHED; a reading that goes on rising without power is LATCHED at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from thermoctl.quantities import is_finite_number
+from thermoctl.regulator import heat_question
+from thermoctl.regulator.heat_blocks import Blocks, Repeats
+from thermoctl.regulator.heat_doubt import HeatDoubt, Seen
+from thermoctl.regulator.heat_question import Answer
+from thermoctl.regulator.heat_response import LAGS_S, Block, Gain, HeatResponse
+from thermoctl.regulator.supervisor import Emit, Supervisor
+
+SURE = 5.0
+"""A gain is known from so many standard deviations on,"""
+ARRIVED_LAGS = 0.5
+"""and once heat for so many lags has arrived."""
+RISE_K, RISE_SDS = 0.1, 6.0
+"""A rise beyond both is one."""
+OFF = 0.01
+"""Power below this is none."""
+OFF_LAGS = 1.5
+"""After so many lags without power nothing is under way any more."""
+RISES = 0.3
+"""A reading that rises by so much of what full power does, without any, is heated all the same."""
+BEFORE_LAGS, BEFORE_S = 1.5, 16.0
+"""What was before the cut is looked at for so long."""
+HEARD_S, HEARD_LAGS = 20.0, 0.5
+"""A good answer is believed from then on, of a heater that is not known, and of one that is;"""
+BAD_S, BAD_LAGS = 60.0, 2.0
+"""a bad one from then on."""
+LONGEST_S, LONGEST_LAGS = 240.0, 12.0
+"""A known heater that has not answered by then does not answer."""
+UNKNOWN_LAGS = 3.0
+"""An unknown one gets another chance after so many of the longest lags, with twice the heat."""
+CHANGED = 0.7
+"""A gain below this share of the one that was known is the new one."""
+LATELY_S = 1800.0
+"""A second verdict within this time latches."""
+ROWS = 450
+"""Blocks that are remembered: half an hour at a second's period."""
+
+_NOT_SEEN = Gain(math.nan, math.nan, 0)
+_FAULTS = {"heater.no_response": 23, "heater.reversed": 3, "heater.stuck_on": 24}
+
+
+@dataclass(frozen=True, slots=True)
+class HeaterCheck:
+    """How a heater is checked.
+
+    Parameters
+    ----------
+    weakest_k_per_s : float
+        Least rise at full power that a healthy plant can have, in K/s; 6e-5 is 50 W in 200 l.
+    first_heat_s : float
+        Seconds of full power an unknown heater has to show that it heats, before it is asked. Less
+        power has longer, by its cube: it does less harm, and a plant that is only held at its set
+        point shows no rise.
+    action : {'heat', 'cool'}
+        What power does to the plant.
+
+    Raises
+    ------
+    ValueError
+        An argument is outside its range.
+    """
+
+    weakest_k_per_s: float = 6e-5
+    first_heat_s: float = 60.0
+    action: Literal["heat", "cool"] = "heat"
+
+    def __post_init__(self) -> None:
+        for name, low, high in (("weakest_k_per_s", 1e-6, 0.5), ("first_heat_s", 10.0, 3600.0)):
+            value = getattr(self, name)
+            if not (is_finite_number(value) and low <= value <= high):
+                raise ValueError(f"{name} must lie within {low:g} to {high:g}, got {value!r}")
+        if self.action not in ("heat", "cool"):
+            raise ValueError(f"action must be 'heat' or 'cool', got {self.action!r}")
+
+
+class _Cut(NamedTuple):
+    """A question that was put: when, what is looked at from when on, and why it was put."""
+
+    at_s: float
+    from_s: float
+    why: str
+
+
+class HeaterWatch:
+    """Watches one heater, and asks it; told of every sample, in every mode and state.
+
+    Parameters
+    ----------
+    check : HeaterCheck
+        What is admissible.
+    period_s : float
+        Nominal time between two samples.
+    supervisor : Supervisor
+        Who is told of a fault.
+    emit : callable
+        Called as ``emit(name, **fields)`` when a question is put, and when it is answered well.
+    """
+
+    def __init__(
+        self, check: HeaterCheck, period_s: float, supervisor: Supervisor, emit: Emit
+    ) -> None:
+        self._check = check
+        self._unknown_s = max(60.0, 10.0 * period_s)
+        self._blocks = Blocks(period_s, 1.0 if check.action == "heat" else -1.0)
+        self._repeats = Repeats()
+        self._response, self._doubt = HeatResponse(), HeatDoubt()
+        self._supervisor, self._emit = supervisor, emit
+        self._known: Gain | None = None
+        self._rows: deque[Seen] = deque(maxlen=ROWS)
+        self._cut: _Cut | None = None
+        self._t_s = self._off_s = 0.0
+        self._failed_s = -math.inf
+        self._distrusted_k = 0.0  # heat that must be answered before anything is learnt again
+        self._patience_s = check.first_heat_s
+        self._begin_trial()
+
+    @property
+    def asks(self) -> bool:
+        """Whether power has to be 0 now, for the sake of a question."""
+        return self._cut is not None
+
+    def observe(self, t_s: float, interval_s: float, reading_c: float, applied: float) -> None:
+        """Take in the `applied` power of the last interval and the reading at its end.
+
+        Parameters
+        ----------
+        t_s, interval_s : float
+            Time of the sample, and since the one before, in s.
+        reading_c : float
+            In degC; NaN where there is none to be believed.
+        applied : float
+            Power that the actuator took, as a fraction.
+        """
+        if interval_s > self._unknown_s:
+            self._lose_track()
+            return
+        if self._repeats.observe(reading_c):
+            text = f"expected readings that differ, got {self._repeats.run + 1} equal ones in a row"
+            self._supervisor.fail("sensor.stuck", 4, text, t_s)
+        block = self._blocks.add(interval_s, reading_c, applied)
+        if block is not None:
+            self._meet(block, t_s)
+
+    def _lose_track(self) -> None:
+        """After a long gap nobody knows what was applied."""
+        self._blocks.clear()
+        self._response.begin_again()
+        self._doubt.clear()
+        self._rows.clear()
+        self._cut = None
+        self._begin_trial()
+
+    def _begin_trial(self) -> None:
+        """Give an unknown heater its heat anew."""
+        self._trial_s, self._trial_from_s, self._lowest_c = 0.0, self._t_s, math.inf
+
+    # -- a block ---------------------------------------------------------------------------------
+
+    def _meet(self, block: Block, t_s: float) -> None:
+        """Make of a block what there is to be made."""
+        known, sd_k = self._known, block.sd_k
+        self._t_s += block.span_s
+        self._off_s = self._off_s + block.span_s if block.power < OFF else 0.0
+        trusted = self._cut is None and self._distrusted_k <= 0.0
+        learns = trusted and (known is None or self._doubt.calm(known, sd_k))
+        self._response.observe(block, learn=learns)
+        if math.isnan(block.reading_c):
+            return
+        before = self._rows[-1] if self._rows else None
+        now = Seen(self._t_s, block.reading_c, self._response.heat_s)
+        self._rows.append(now)
+        if self._cut is not None:
+            self._hear(self._cut, block, now, t_s)
+            return
+        if learns:
+            self._know(now)
+        if self._known is None:
+            self._try(block, now)
+        elif before is not None:
+            self._compare(self._known, block, before, now, t_s)
+
+    def _know(self, now: Seen) -> None:
+        """Take what was learnt for known, once it is sure."""
+        gain = self._response.gain
+        if gain is None or gain is self._known or gain.mean <= SURE * gain.sd:
+            return
+        if float(now.heat_s[gain.place]) > ARRIVED_LAGS * gain.lag_s:
+            self._known = gain
+
+    def _try(self, block: Block, now: Seen) -> None:
+        """Let an unknown heater show a rise; ask it when it has had its heat."""
+        self._lowest_c = min(self._lowest_c, now.reading_c)
+        self._trial_s += block.power**3 * block.span_s  # at a fifth of the power: 2 hours
+        rise_k = now.reading_c - self._lowest_c
+        if rise_k > max(RISE_K, RISE_SDS * block.sd_k):
+            self._patience_s = self._check.first_heat_s
+            self._begin_trial()
+        elif self._trial_s >= self._patience_s:
+            given_s = now.t_s - self._trial_from_s
+            why = (
+                f"expected a rise by {block.power:.0%} power in {given_s:.0f} s, got {rise_k:.2f} K"
+            )
+            self._ask(now, self._trial_from_s, why)
+
+    def _compare(self, known: Gain, block: Block, before: Seen, now: Seen, t_s: float) -> None:
+        """Compare what a known heater should have done with what came."""
+        doubt, sd_k, jumped = self._doubt, block.sd_k, self._response.jumped
+        doubt.compare(known, block, before, now, jumped=jumped, follow=self._distrusted_k <= 0.0)
+        if self._distrusted_k > 0.0 and doubt.calm(known, sd_k):
+            place = known.place
+            self._distrusted_k -= known.mean * float(now.heat_s[place] - before.heat_s[place])
+        hot = doubt.hot(known, sd_k)
+        if hot and self._off_s >= OFF_LAGS * known.lag_s:
+            rows = self._rows
+            rate = heat_question.slope(rows, self._t_s - OFF_LAGS * known.lag_s)
+            self._fail("heater.stuck_on", _rises(rate), t_s)
+        elif hot or (doubt.cold(known, sd_k) and block.power >= OFF):
+            before_s = max(BEFORE_LAGS * known.lag_s, BEFORE_S)
+            self._ask(now, self._t_s - before_s, doubt.told(known, now))
+
+    # -- a question ------------------------------------------------------------------------------
+
+    def _ask(self, now: Seen, from_s: float, why: str) -> None:
+        self._cut = _Cut(now.t_s, from_s, why)
+        self._emit("heater.questioned", text=f"{why}; power is cut to see what it does")
+
+    def _hear(self, cut: _Cut, block: Block, now: Seen, t_s: float) -> None:
+        """Look for an answer; go on when it is a good one, fail when it is none."""
+        known, asked_s = self._known, now.t_s - cut.at_s
+        lag_s = LAGS_S[-1] if known is None else known.lag_s
+        if known is not None and self._off_s > (OFF_LAGS + 1.0) * lag_s:
+            rate = heat_question.slope(self._rows, now.t_s - max(OFF_LAGS * lag_s, BEFORE_S))
+            if rate > RISES * known.mean:
+                self._fail("heater.stuck_on", _rises(rate), t_s)
+                return
+        answer, shown = self._answer(cut, block.sd_k, now)
+        heard_s, bad_s = (
+            (HEARD_S, BAD_S) if known is None else (HEARD_LAGS * lag_s, BAD_LAGS * lag_s)
+        )
+        if answer is Answer.HEATS:
+            if asked_s >= heard_s:
+                self._accept(shown, asked_s)
+        elif asked_s < bad_s:
+            return
+        elif answer is not Answer.OPEN:
+            self._refuse(answer, cut, shown, asked_s, t_s)
+        elif known is not None and asked_s > max(LONGEST_LAGS * lag_s, LONGEST_S):
+            self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
+        elif known is None and asked_s > UNKNOWN_LAGS * lag_s:
+            self._patience_s *= 2.0
+            self._go_on()
+
+    def _answer(self, cut: _Cut, sd_k: float, now: Seen) -> tuple[Answer, Gain]:
+        """Return what the reading says so far, and the gain it shows.
+
+        An answer counts only if the reading turned the same way when the power was cut.
+        """
+        rows = [row for row in self._rows if row.t_s >= cut.from_s]
+        found = heat_question.contrast(rows, sd_k)
+        if found is None:
+            return Answer.OPEN, _NOT_SEEN
+        known = self._known
+        if known is not None:
+            answer, shown = heat_question.of_known(found, known)
+            recent_s = max(known.lag_s, BEFORE_S)
+        else:
+            weakest, recent_s = self._check.weakest_k_per_s, 2.0 * BEFORE_S
+            drift = heat_question.slope(rows, -math.inf)
+            answer, shown = heat_question.of_unknown(found, weakest, drift)
+            whole = heat_question.contrast(list(self._rows), sd_k)
+            if answer is Answer.OPEN and whole is not None:
+                answer, shown = heat_question.of_unknown(whole, weakest, drift)
+        before = heat_question.slope(rows, cut.at_s - recent_s, cut.at_s)
+        after = heat_question.slope(rows, max(now.t_s - recent_s, cut.at_s))
+        turned = {Answer.HEATS: after < before, Answer.COOLS: after > before}
+        return (answer if turned.get(answer, True) else Answer.OPEN), shown
+
+    def _accept(self, shown: Gain, asked_s: float) -> None:
+        """Go on with a heater that heats, and with the gain it has shown if that is news."""
+        text = f"{asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s"
+        self._emit("heater.answered", text=text)
+        known = self._known
+        if known is None or shown.mean < CHANGED * known.mean:
+            self._known = known = shown
+        self._doubt.trust(known)
+        self._patience_s = self._check.first_heat_s
+        self._distrusted_k = 0.0
+        self._go_on()
+
+    def _refuse(self, answer: Answer, cut: _Cut, shown: Gain, asked_s: float, t_s: float) -> None:
+        """Fail a heater that answered with nothing, or the wrong way."""
+        code = "heater.reversed" if answer is Answer.COOLS else "heater.no_response"
+        known = "" if self._known is None else f" instead of {self._known.mean:.3g}"
+        text = (
+            f"{cut.why}; {asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s{known}"
+        )
+        self._fail(code, text, t_s)
+
+    def _fail(self, code: str, text: str, t_s: float) -> None:
+        """Go to SAFE; to LATCHED at the second time, or where nothing can switch it off."""
+        fault = _FAULTS[code]
+        self._supervisor.fail(code, fault, text, t_s)
+        if code == "heater.stuck_on" or self._t_s - self._failed_s < LATELY_S:
+            self._supervisor.latch(code, fault, text, t_s)
+        self._failed_s = self._t_s
+        if self._known is not None:
+            self._distrusted_k = 2.0 * self._known.stored_k
+        self._go_on()
+
+    def _go_on(self) -> None:
+        self._cut = None
+        self._doubt.clear()
+        self._begin_trial()
+
+
+def _rises(rate: float) -> str:
+    """Return what is to be said of a reading that rises by `rate` in K/s."""
+    return f"expected no rise without power, got {60.0 * rate:+.2f} K a minute"
