@@ -87,7 +87,7 @@ class SetPoint:
 
 @dataclass(frozen=True, slots=True)
 class ManualPower:
-    """Request: give `power`, in [0, 1] or with a cooler [-1, 1], while the mode is MANUAL."""
+    """Request: give `power` in mode MANUAL: in [0, 1], with a cooler in [-1, 1]."""
 
     power: float
 

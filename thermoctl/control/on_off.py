@@ -1,4 +1,4 @@
-"""Full power on one side of the set point, none beyond: a thermostat with hysteresis.
+"""Full power on one side of the set point, none beyond: a thermostat.
 
 Implements section 6 of ``docs/theory.md``.
 """

@@ -22,7 +22,7 @@ from thermoctl.plant.probe import ProbeInTank
 
 
 class Tank:
-    """Two zones of water, glass, ice, a heater with its power stage, a cooler, a probe.
+    """Two zones of water, glass, ice, a heater with its stage, a cooler, a probe.
 
     Parameters
     ----------

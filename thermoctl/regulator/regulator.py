@@ -150,11 +150,11 @@ class Regulator:
 
     @property
     def released(self) -> bool:
-        """Whether power may be given at all: neither off, nor SAFE or LATCHED, nor tripping."""
+        """Whether power may be given: neither off, nor SAFE or LATCHED, nor tripping."""
         return self._wishes.mode is not Mode.OFF and self._supervisor.released
 
     def lead(self, setpoint_c: float, *, released: bool) -> None:
-        """Follow another loop from now on: hold `setpoint_c`, give no power unless `released`.
+        """Follow another loop: hold `setpoint_c`, give no power unless `released`.
 
         Asked at every sample, before `step`; a set point from anybody else is refused then.
         """

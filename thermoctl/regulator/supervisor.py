@@ -77,7 +77,7 @@ class Supervisor:
 
     @property
     def released(self) -> bool:
-        """Whether any power may pass: not in SAFE or LATCHED, nor while a trip is pending."""
+        """Whether power may pass: not in SAFE or LATCHED, nor while a trip is pending."""
         sound = self.state not in (State.SAFE, State.LATCHED) and self._tripping is None
         return sound and self.master_released
 

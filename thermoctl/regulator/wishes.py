@@ -84,7 +84,7 @@ class Wishes:
         return self.reference
 
     def follow(self, setpoint_c: float) -> None:
-        """Hold what a loop above this one asks for, at every sample anew and without an event."""
+        """Hold what a loop above this one asks for at this sample, without an event."""
         self._led = True
         self.setpoint_c = self._limits.accept_setpoint(setpoint_c)
 

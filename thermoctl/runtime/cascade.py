@@ -35,7 +35,7 @@ class Lead:
         return self.low_c + power * (self.high_c - self.low_c)
 
     def power_at(self, temperature_c: float) -> float:
-        """Return the power that a block of this temperature gives, in [0, 1]; NaN: not known."""
+        """Return the power that a block so warm gives, in [0, 1]; NaN: not known."""
         if not math.isfinite(temperature_c):
             return math.nan
         return clamp((temperature_c - self.low_c) / (self.high_c - self.low_c), 0.0, 1.0)
@@ -62,7 +62,7 @@ def outer_first(wirings: Iterable[Wiring]) -> tuple[Wiring, ...]:
 
 
 def hand_down(wiring: Wiring, power: float, wirings: Mapping[str, Wiring]) -> None:
-    """Give the set point that `power` stands for to the loop that `wiring` leads, if any."""
+    """Give the loop that `wiring` leads, if any, the set point for `power`."""
     if wiring.lead is not None:
         setpoint_c = wiring.lead.setpoint_c(power)
         inner = wirings[wiring.lead.inner].regulator

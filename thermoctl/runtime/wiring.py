@@ -23,7 +23,7 @@ class Output:
     law: ActuatorLaw
 
     def power(self, drive: object) -> float:
-        """Return the power of what the hardware took; NaN, and not 0, when it does not say."""
+        """Return the power of what was taken; NaN, and not 0, when that is not said."""
         known = is_finite_number(drive)
         return self.law.power_from(drive) if known else math.nan  # type: ignore[arg-type]
 
