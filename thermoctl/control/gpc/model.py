@@ -26,7 +26,9 @@ N_MAX, M_MAX, DELAY_MAX = 3, 12, 60
 
 @dataclass(frozen=True, slots=True)
 class ChangeModel:
-    """The structure; theta is (a_1 ... a_(n-1), b_1 ... b_m, loss), in K a block at full power.
+    """The structure, and what follows from its parameters.
+
+    theta is (a_1 ... a_(n-1), b_1 ... b_m, loss), b's and loss in K a block.
 
     Parameters
     ----------

@@ -64,7 +64,17 @@ def best_powers(
 
 
 def bounded_minimum(H: Array, g: Array, most: float) -> Array:
-    """Return the x in [0, most] at which ``x' H x / 2 - g' x`` is least; H positive definite."""
+    """Return the x in [0, most] at which ``x' H x / 2 - g' x`` is least.
+
+    Parameters
+    ----------
+    H : ndarray, shape (moves, moves)
+        Symmetric and positive definite.
+    g : ndarray, shape (moves,)
+        What pulls x upwards.
+    most : float
+        Upper bound of each, positive.
+    """
     x: Array = np.asarray(np.linalg.solve(H, g), dtype=np.float64)
     if x.min() >= 0.0 and x.max() <= most:
         return x
