@@ -38,7 +38,8 @@ def _parts(item: Item, look: Look, label_cells: int, *, errors: bool) -> list[Pa
     def cell(string: str, width: int) -> str:
         return f"{printable(string, utf8=look.utf8):<{width}}"
 
-    label = item.label if len(item.label) < label_cells else item.short
+    whole = len(printable(item.label, utf8=look.utf8)) < label_cells
+    label = item.label if whole else item.short
     head: list[Part] = [(cell(label, label_cells), Role.MUTE)]
     if item.value == numbers.UNKNOWN:
         return [*head, (f"{item.value:>{_VALUE}} ", Role.STRONG), (item.unit, Role.MUTE)]

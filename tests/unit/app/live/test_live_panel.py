@@ -67,6 +67,9 @@ def test_errors_and_units_stand_below_each_other(
     assert len(at) == 1
     sign = "±" if utf8 else "+-"
     assert len({shown[name].index(sign) for name in ("Gain", "Loss", "To")}) == 1
+    inflation = next(row for row in rows if "1.00 " in row and row.startswith("Gain"))
+    tick = next(row for row in rows if "Tick" in row)
+    assert inflation.index("1.00 ") + len("1.00") == tick.index("78 ") + len("78")
 
 
 def test_a_loss_is_told_in_watts_per_kelvin_as_soon_as_that_is_known(
