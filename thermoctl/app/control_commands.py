@@ -143,7 +143,7 @@ def get(key: str, loop: str | None, socket: Path | None, as_json: bool) -> None:
 def set_command(
     value_c: float, ramp: float | None, loop: str | None, socket: Path | None, as_json: bool
 ) -> None:
-    """Hold another temperature, in °C; at once, or as fast as the configuration has it."""
+    """Hold another temperature, in °C; at once, unless a rate limits it."""
     told = _asked(socket, "set", loop=loop, value_c=value_c, rate_k_per_min=ramp)
     at = "" if ramp is None else f", at {ramp:g} K/min"
     words = f"set point {_plain(numbers.temperature(told['setpoint_c']))}{at}"
@@ -187,7 +187,7 @@ def output(power: float, loop: str | None, socket: Path | None, as_json: bool) -
 def load(
     power: float, duration_s: float, loop: str | None, socket: Path | None, as_json: bool
 ) -> None:
-    """Say that the plant is about to lose so much of full power beside its usual loss."""
+    """Say what the plant is about to lose beside its usual loss."""
     told = _asked(socket, "load", loop=loop, power=power, duration_s=duration_s)
     _tell(told, as_json, lambda: f"load {100.0 * told['power']:g} % for {told['duration_s']:g} s")
 

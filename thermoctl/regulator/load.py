@@ -1,4 +1,4 @@
-"""A load that is known beforehand: what a plant is about to lose beside its usual loss.
+"""A load that is known beforehand: what a plant loses beside its usual loss.
 
 The controller is shown the power that is left of what was applied, and what it asks for is raised
 by the load. So any law holds through it, without being told, and none learns it as a loss.
