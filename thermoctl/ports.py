@@ -248,11 +248,11 @@ class Remembering(Protocol):
         ...
 
     def origin(self, belief: Any) -> str | None:
-        """Return what the model began with: ``new``, ``trial``, ``stored`` or ``dropped``."""
+        """Return ``new``, ``trial``, ``stored`` or ``dropped``: how the model began."""
         ...
 
     def start_from(self, remembered: Mapping[str, Any], age_s: float) -> Any:
-        """Return the belief before the first sample, with what was `remembered` for `age_s`.
+        """Return the belief before the first sample, with what was `remembered`.
 
         What comes back may be of another plant by now: it has to be doubted, and given up where the
         readings speak against it.

@@ -1,4 +1,4 @@
-"""Where a start takes up what the last run left: modes, set points, controllers, latches.
+"""Where a start takes up what the last run left: wishes and latches.
 
 A restarted loop is off unless its configuration says ``resume = true``. What is edited in the
 configuration since is a newer wish than what was stored, and counts as a first start.

@@ -1,4 +1,4 @@
-"""A ``[loops.NAME]`` table made of what a tuning found: its model, and its limits."""
+"""A ``[loops.NAME]`` table made of what a tuning found: model and limits."""
 
 from __future__ import annotations
 

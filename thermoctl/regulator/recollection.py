@@ -36,7 +36,7 @@ def recall(minds: Iterable[Mind | None], remembered: Mapping[str, Remembered], e
 
 
 def origin(mind: Mind) -> str | None:
-    """Return what the model of `mind` began with; None of a law that remembers nothing."""
+    """Return how the model of `mind` began; None of a law without a memory."""
     if mind.remembers is None:
         return None
     told = attempt(partial(mind.remembers.origin, mind.belief))
@@ -44,7 +44,7 @@ def origin(mind: Mind) -> str | None:
 
 
 def remembering(minds: Iterable[Mind | None]) -> Callable[[], Models]:
-    """Return a function that says what `minds` would like to be kept, as they are now."""
+    """Return a function that says what `minds`, as they are, would like kept."""
     held = [
         (mind.name, mind.remembers, mind.belief)
         for mind in minds

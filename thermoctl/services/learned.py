@@ -1,4 +1,4 @@
-"""What controllers have learnt, kept on disk over a restart: a file for each loop.
+"""What controllers have learnt, on disk over a restart: a file a loop.
 
 Written as everything that must survive (`thermoctl.services.store`), so it is the old one or the
 new one, never a torn one. Unlike a latch it is no promise: whatever cannot be read is ignored with

@@ -182,7 +182,7 @@ def _likelihood(nu: Array, S: Array, e: float) -> Array:
 
 
 def weighted(log: Array) -> Weights:
-    """Return the weights of these logarithms, which become theirs: 0 the greatest of them."""
+    """Return the weights of these logarithms, which become theirs."""
     likeliest = int(log.argmax())
     log -= log[likeliest]
     np.maximum(log, FLOOR, out=log)

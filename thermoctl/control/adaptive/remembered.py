@@ -76,7 +76,7 @@ def remember(bank: Bank, belief: BankBelief) -> dict[str, Any] | None:
 
 
 def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBelief:
-    """Return the belief before the first sample, with what was remembered for `age_s`.
+    """Return the belief before the first sample, with what was remembered.
 
     Raises
     ------
