@@ -67,7 +67,7 @@ class LearnedStore:
             return {}, f"{self.path_of(loop)} is ignored: {error}"
 
     def forget(self, loop: str) -> bool:
-        """Remove what is remembered of `loop`, for good; return whether there was anything.
+        """Remove what is remembered of `loop`; return whether there was anything.
 
         Raises
         ------

@@ -96,7 +96,7 @@ class _Plant:
 
 
 def proposed(tuning: Tuning, now: InForce) -> tuple[Proposal, ...]:
-    """Return a limit for each that the plant has a say in; none where it was not heard."""
+    """Return the limits that the plant has a say in; none where it was not heard."""
     words = tuning.words
     if words is None:
         return ()
