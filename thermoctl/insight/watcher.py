@@ -27,6 +27,8 @@ CHANGES = 10
 """So many changes are remembered."""
 SETTLED_LAGS, SETTLED_S = 10.0, 60.0
 """The plant is taken as known when the loop has been at rest for so long."""
+CALM_S, CALM_LAGS = 600.0, 30.0
+"""After a move glass and corners follow for so long, and no line is laid through that."""
 SURE = 0.15
 """A gain whose standard deviation is a larger share of it is not known."""
 ROWS_S = 5.0
@@ -75,6 +77,7 @@ class Insights:
         self._changes: deque[Change] = deque(maxlen=CHANGES)
         self._applied, self._power = 0.0, _Turn()
         self._rows_due_s = self._jumped_s = -math.inf
+        self._moving = True
         self._now = Insight()
 
     @property
@@ -109,8 +112,7 @@ class Insights:
 
     def _moved(self, step: Step) -> None:
         """Forget what another set point or mode has made worthless."""
-        if self._known is not None:
-            self._known.changes.forget()
+        self._moving = True
         self._faults.settle_anew()
         self._power = _Turn()
         auto = step.mode is Mode.AUTO and step.state is State.RUN
@@ -125,6 +127,10 @@ class Insights:
         known = self._known_after(step, plant)
         if known is None:
             return
+        if self._moving and self._rest.lasts_s(step.t_s) >= max(CALM_S, CALM_LAGS * known.lag_s):
+            self._moving = False
+        if self._moving:
+            known.changes.forget()
         found = known.changes.after(step.t_s, reading_c, applied, plant.noise_sd_k)
         if found is not None:
             self._found(known, step.t_s, found)
