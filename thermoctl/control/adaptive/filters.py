@@ -145,7 +145,7 @@ def predicted(
 
 
 def loosened(block: Block, heat: Array, due: Array) -> None:
-    """Make gain and loss of a new block uncertain together, where it is `due`; in place.
+    """Make gain and loss uncertain together, where it is `due`; in place.
 
     Under constant heat only their difference shows. The start is tight on the loss, so that it does
     not take the place of a gain; now both may grow or shrink by as much, and what was learnt of the
