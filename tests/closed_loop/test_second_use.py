@@ -44,10 +44,12 @@ class Row:
     board: dict[str, Any] = field(default_factory=dict)
     controller: dict[str, Any] = field(default_factory=dict)
     at_least: float = 0.0
+    changeover_s: float = 5.0
 
 
 COOLING = (Leg(12.0, 3900), Leg(10.0, 1500))
 BOTH = (Leg(18.0, 2700), Leg(30.0, 1500), Leg(24.0, 2100))
+WAITING = (Leg(18.0, 2700, deviation_mk=50.0), Leg(30.0, 1500), Leg(24.0, 2100))
 SMALL = {"volume_l": 2.0, "heater_w": 375.0, "cooler_w": 75.0}
 ROWS = (
     *(Row(f"cooled, specimen {n}", "cool", COOLING, n) for n in (1, 2, 3)),
@@ -57,6 +59,8 @@ ROWS = (
     *(Row(f"heated and cooled, specimen {n}", "heat-cool", BOTH, n, at_least=-1.0)
       for n in (1, 2, 3)),
     Row("heated and cooled, 2 l", "heat-cool", BOTH, 4, board=SMALL, at_least=-1.0),
+    Row("a minute between heater and cooler", "heat-cool", WAITING, 1, at_least=-1.0,
+        changeover_s=60.0),
     Row("a cooler as strong as the heater", "heat-cool", BOTH, 5, board={"cooler_w": 1500.0},
         controller={"cooling_ratio": 1.0}, at_least=-1.0),
     Row("a ratio half of what it is", "heat-cool", BOTH, 6, controller={"cooling_ratio": 0.1},
@@ -68,7 +72,10 @@ def play(row):
     """Return the cycles of a row, leg by leg."""
     document = load(CONFIG / f"{row.profile}.toml").model_dump()
     document["boards"]["daq"] |= {"tolerances": 0.1, **row.board}
-    document["loops"]["tank"]["controller"] |= row.controller
+    loop = document["loops"]["tank"]
+    loop["controller"] |= row.controller
+    if loop["cooler"] is not None:
+        loop["cooler"]["changeover_s"] = row.changeover_s
     cycles, clock, legs = [], SimulatedClock(), []
     loop = loop_for(bench_settings(load(document), row.seed), clock, cycles.append, beside=False)
     t_s = 0

@@ -49,7 +49,7 @@ class Tank:
     def by_hand(self, power):
         self.loop.ask(Mode.MANUAL)
         self.loop.ask(ManualPower(power))
-        self.run(10)
+        self.run(70)  # it may have to wait until the other one was off for long enough
         assert self.last.accepted_power == pytest.approx(power, abs=1e-3)
 
     def seconds_to_all_off(self, at_most=100):
