@@ -35,8 +35,8 @@ ROWS_S = 5.0
 """Time from one set of rows to the next."""
 GAIN_MOVED = 1.1
 """A gain that has moved by this factor makes the balance begin anew."""
-LAG_MOVED = 2.5
-"""A lag that has moved by this factor makes everything begin anew."""
+LAG_MOVED, LAG_HOLDS_S = 2.5, 3_600.0
+"""A lag that has moved by this factor, for so long, makes everything begin anew."""
 
 
 class Insights:
@@ -144,7 +144,7 @@ class Insights:
 
     def _known_after(self, step: Step, plant: PlantBelief) -> _Known | None:
         """Return what is known of the plant, which begins when the loop is first at rest."""
-        if self._known is not None and not self._known.outlived(plant.lag_s):
+        if self._known is not None and not self._known.outlived(step.t_s, plant.lag_s):
             return self._known
         settled_s = max(SETTLED_S, SETTLED_LAGS * plant.lag_s)
         sure = 0.0 < plant.gain_sd_k_per_s < SURE * abs(plant.gain_k_per_s)
@@ -272,12 +272,15 @@ class _Known:
         self._period_s, self.lag_s = period_s, plant.lag_s
         self.gain = Known(plant.gain_k_per_s, plant.gain_sd_k_per_s)
         self.slope: Known | None = None
+        self._alike_s = math.nan
         self.reckoning = Reckoning(self.lag_s, self.gain.value, samples)
         self.changes = ChangeWatch(period_s, self.lag_s, self.gain.value, power)
 
-    def outlived(self, lag_s: float) -> bool:
-        """Return whether the plant has another lag by now."""
-        return not self.lag_s / LAG_MOVED <= lag_s <= self.lag_s * LAG_MOVED
+    def outlived(self, t_s: float, lag_s: float) -> bool:
+        """Return whether the plant has another lag by now, and not just for a while."""
+        if self.lag_s / LAG_MOVED <= lag_s <= self.lag_s * LAG_MOVED or math.isnan(self._alike_s):
+            self._alike_s = t_s
+        return t_s - self._alike_s > LAG_HOLDS_S
 
     def take(self, found: Assay, power: float) -> None:
         """Take over a gain that was assayed on a move."""
