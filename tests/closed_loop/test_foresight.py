@@ -78,23 +78,15 @@ def settled(seed=0, setpoint_c=37.5, **keys):
 
 
 @pytest.mark.parametrize(
-    ("seed", "rate_k_per_min", "end_c", "mean_k"),
-    [
-        (1, 1.0, 45.0, 0.1),
-        (2, 1.0, 45.0, 0.1),
-        (0, 1.0, 45.0, 0.2),  # here the heater's lag is taken for the sensor's, some 9 s of it
-        (0, 0.2, 41.0, 0.1),
-    ],
+    ("seed", "rate_k_per_min", "end_c"), [(0, 1.0, 45.0), (1, 1.0, 45.0), (0, 0.2, 41.0)]
 )
-def test_a_ramp_is_followed_without_lag_and_ends_without_overshoot(
-    seed, rate_k_per_min, end_c, mean_k
-):
+def test_a_ramp_is_followed_without_lag_and_ends_without_overshoot(seed, rate_k_per_min, end_c):
     bench, offset_k = settled(seed)
     bench.regulator.request(SetPoint(end_c, rate_k_per_min))
     ramp_s = round((end_c - 37.5) / rate_k_per_min * 60.0)
     true_c, reference_c, _ = bench.run(ramp_s)
-    error_k = (true_c - offset_k - reference_c)[120:]
-    assert abs(error_k.mean()) < mean_k
+    error_k = (true_c - offset_k - reference_c)[120:-40]  # it rounds the corner
+    assert abs(error_k.mean()) < 0.1
     assert np.abs(error_k - error_k.mean()).max() < 0.15
     after_c, _, _ = bench.run(600)
     assert after_c.max() - offset_k < end_c + 0.1

@@ -179,11 +179,6 @@ class Bank:
             array.setflags(write=False)
         return BankBelief(sample, blind, excitation, way, *met, ahead)
 
-    def lead_s(self, belief: BankBelief) -> float:
-        """Return how long power takes to the water, without the sensor: a mean."""
-        to_water = self.hypotheses.element + self.hypotheses.dead_periods
-        return self.period_s * float(belief.weights.share.dot(to_water))
-
     def lost(self, belief: BankBelief) -> BankBelief:
         """Return the belief after a gap of which the applied power is not known."""
         blind = max(belief.blind, math.ceil(BLIND_S / self.period_s)) + 1

@@ -12,14 +12,15 @@ law goes on without a bump. The power follows v with the lag :math:`\tau`, which
 like any other: the temperature is led to the set point as without it, and by far less travel.
 
 On a ramp :math:`r + \rho t` the power to rest with is :math:`u_{ss} + \rho/\beta` instead: with it
-from now on the water comes to lie on the line :math:`T_\infty - \rho\,\lambda + \rho t`, where
-:math:`\lambda = t_1 + h n_d` is the lag ahead of the water, and that line shall be the ramp. Hence,
-for a power without a lag of its own,
+from now on the water comes to lie on the line :math:`T_\infty - \rho\,(t_1 + h n_d) + \rho t`, and
+the reading on one that is later by the lag of the sensor. That line shall be the ramp. Hence, with
+the total lag :math:`\lambda` and for a power without a lag of its own,
 
 .. math:: u = u_{ss} + \frac{\rho}{\beta} + \frac{r + \rho\,\lambda - T_\infty}{\beta\, T_c},
 
-which is the law above for where the ramp will be when the heat of now arrives. The sensor's lag has
-no part in it, for the filters see through it.
+which is the law above for where the ramp will be when the heat of now is read. So the reading is on
+the ramp and the water ahead of it. The other way round would be better, but no power tells the lag
+of a sensor from that of a heater, and the error would be what the one is taken for the other.
 
 Implements section 9 of ``docs/theory.md``.
 """

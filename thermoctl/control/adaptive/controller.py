@@ -186,7 +186,7 @@ class Adaptive:
         if situation.setpoint_rate_k_per_s != 0.0:
             rate = self._sign * situation.setpoint_rate_k_per_s
             end_c = self._sign * situation.target_c
-            r_c, rate = ahead(r_c, rate, end_c, self.bank.lead_s(belief.bank))
+            r_c, rate = ahead(r_c, rate, end_c, outlook.lag_s)
             ramp_heat = rate / outlook.gain
         heat = power_for(outlook, r_c, self.calmness, self.period_s, bounds, before, ramp_heat)
         return belief, self._power(heat)
