@@ -91,7 +91,7 @@ class ProbeInTank:
             self._away, self._met_c = None, self._past[-1][1]
 
     def leave(self, there_c: float, duration_s: float) -> None:
-        """Lie outside the tank, where it has `there_c`, for `duration_s`; NaN: stand still."""
+        """Lie outside the tank, where it has `there_c`; NaN: stand still."""
         self._away, self._away_until_s = there_c, self._t_s + duration_s
 
     def _arriving(self, left_s: float) -> float:

@@ -1,4 +1,4 @@
-"""Samples are gathered into blocks, so that watching a heater costs next to nothing a sample."""
+"""Samples in blocks: watching a heater costs next to nothing a sample."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Blocks:
         self._readings = 0
 
     def add(self, interval_s: float, reading_c: float, applied: float) -> Block | None:
-        """Add a sample, its reading NaN where there is none; return a block that it completes."""
+        """Add a sample, NaN for no reading; return a block that it completes."""
         self._span_s += interval_s
         self._given_s += applied * interval_s
         if reading_c == reading_c:  # nearly always, and faster than to ask for NaN
@@ -62,7 +62,7 @@ class Blocks:
 
 
 class Repeats:
-    """Tells a converter that repeats itself from one whose steps are larger than its noise.
+    """Tells a converter that stands still from one with coarse steps.
 
     The share of readings that equal the one before is learnt; a run that is next to impossible by
     that share, and no shorter than `LEAST`, is a converter that stands still.

@@ -1,4 +1,4 @@
-r"""How far the reading lags behind what the applied power should have done to it, or runs ahead.
+r"""How far the reading is from what the power should have done to it.
 
 The model is what was known some minutes ago: it must not follow a fault at once, or it would
 explain everything away. With the mean rate of heat and reading in quiet times the loss is
@@ -34,11 +34,13 @@ EXTRA_GAINS, EXTRA_SHARE = 2.5, 0.3
 """So many times the gain, and so much of full power besides, is no stuck output."""
 MEMORY_S, MEMORY_LAGS = 300.0, 10.0
 """Memory of the quiet rates."""
-SLOW_S = 3600.0
-"""Memory of the loss as it was."""
-CREPT, CREPT_S, CREPT_FROM_S = 0.2, 100.0, 600.0
-"""A loss that has grown by so much of full power, for so long: a reading that stands still makes a
-controller add power little by little, and looks like a plant that loses ever more."""
+CREPT, CREPT_S = 0.12, 100.0
+"""A loss that has grown by so much of full power, for so long, while the reading has stood still: a
+sensor that shows the same for ever makes a controller add power little by little."""
+STANDS_K = 0.3
+"""A reading this close to where it was has stood still."""
+COMPARED_FROM_S, COMPARED_S = 600.0, 21600.0
+"""The loss it had is learnt for the first time, and forgotten over the second."""
 SETTLE_S = 300.0
 """After a jump it is not known what the plant does without power."""
 
@@ -64,7 +66,8 @@ class HeatDoubt:
         self._rates: Array = np.zeros(len(LAGS_S))
         self._rise_rate = 0.0
         self._known_s = 0.0
-        self._slow_loss = 0.0
+        self._stood_c = math.nan
+        self._stood_s = self._stood_loss = 0.0
         self._settle_s = 0.0
         self.since: Seen | None = None
         self.clear()
@@ -76,7 +79,7 @@ class HeatDoubt:
 
     def trust(self, gain: Gain) -> None:
         """Take the loss for what it is now: the heater was asked, and answers."""
-        self._slow_loss = self.loss(gain)
+        self._stood_loss = self.loss(gain)
 
     def loss(self, gain: Gain) -> float:
         """Return how fast the reading should fall without power, in K/s."""
@@ -115,7 +118,7 @@ class HeatDoubt:
         if follow and not jumped and self.calm(gain, block.sd_k):
             rise_k = clamp(rise_k, -full_k, full_k)
             self._follow(gain, heat_s / span_s, rise_k / span_s, span_s)
-        self._creep(gain, span_s)
+        self._creep(gain, now.reading_c, block)
 
     def _follow(self, gain: Gain, rates: Array, rise_rate: float, span_s: float) -> None:
         """Let the quiet rates follow those of a block."""
@@ -124,20 +127,26 @@ class HeatDoubt:
         share = span_s / min(self._known_s, memory_s)
         self._rates = self._rates + share * (rates - self._rates)
         self._rise_rate += share * (rise_rate - self._rise_rate)
-        slow = span_s / min(self._known_s, max(SLOW_S, memory_s))
-        self._slow_loss += slow * (self.loss(gain) - self._slow_loss)
 
-    def _creep(self, gain: Gain, span_s: float) -> None:
-        grown = self.loss(gain) - self._slow_loss
-        crept = self._known_s > CREPT_FROM_S and grown > CREPT * gain.mean
+    def _creep(self, gain: Gain, reading_c: float, block: Block) -> None:
+        """Notice a loss that grows while the reading stands still."""
+        loss, span_s = self.loss(gain), block.span_s
+        if not abs(reading_c - self._stood_c) < max(STANDS_K, SDS * block.sd_k):
+            self._stood_c, self._stood_s, self._stood_loss = reading_c, 0.0, loss
+        self._stood_s += span_s
+        memory_s = COMPARED_S if self._stood_s > COMPARED_FROM_S else MEMORY_S
+        self._stood_loss += min(span_s / memory_s, 1.0) * (loss - self._stood_loss)
+        grown = loss - self._stood_loss
+        seen = self._stood_s > COMPARED_FROM_S and grown * MEMORY_S > SDS * block.sd_k
+        crept = seen and grown > CREPT * gain.mean
         self._crept_s = self._crept_s + span_s if crept else 0.0
 
     def told(self, gain: Gain, now: Seen) -> str:
         """Return what was expected since the doubt began, and what came."""
         since, loss = self.since, self.loss(gain)
         if self._crept_s > CREPT_S:
-            grown, before = loss / gain.mean, self._slow_loss / gain.mean
-            return f"expected a loss near {before:.0%} of full power, got {grown:.0%}"
+            grown, before = loss / gain.mean, self._stood_loss / gain.mean
+            return f"expected about {before:.0%} power to hold the reading, it took {grown:.0%}"
         if since is None or not now.t_s > since.t_s:
             return "expected a reading that answers to the power"
         span_s = now.t_s - since.t_s

@@ -1,4 +1,4 @@
-r"""The question that is put to a heater in doubt: what does the reading do without power?
+r"""The question to a heater in doubt: what does the reading do without power?
 
 To cut the power is always safe, and it tells what watching cannot: whatever cools or warms the
 reading besides goes on as before, and only the heater's part ends. The answer is the gain beta in
@@ -28,7 +28,7 @@ SURE = 4.0
 """A gain differs from nothing at so many standard deviations."""
 ANSWERS, NOTHING = 0.35, 0.3
 """Of the known gain: so much is an answer, of whatever sign, and less than that is none."""
-RULED_OUT = 2.0
+RULED_OUT = 1.6
 """A gain is ruled out so many standard deviations away."""
 USELESS = 0.1
 """A heater that does not make up for this share of the loss has no use that anybody could see."""
@@ -46,7 +46,7 @@ class Answer(Enum):
 
 
 class Contrast(NamedTuple):
-    """Gain in K/s for each lag, its standard deviation, and the variance that is left over."""
+    """Gain in K/s for each lag, its sd, and the variance that is left over."""
 
     mean: Array
     sd: Array
@@ -80,7 +80,7 @@ def contrast(rows: Sequence[Seen], sd_k: float) -> Contrast | None:
 
 
 def of_known(found: Contrast, known: Gain) -> tuple[Answer, Gain]:
-    """Return what `found` says of a heater whose gain was known, and the gain it shows."""
+    """Return what `found` says of a known heater, and the gain it shows."""
     last = len(LAGS_S) - 1
     near = range(max(known.place - 1, 0), min(known.place + 1, last) + 1)
     shown = found.best(near)
@@ -113,12 +113,25 @@ def of_unknown(found: Contrast, weakest: float, slope: float) -> tuple[Answer, G
     return (Answer.NOTHING if most < max(weakest, useless) else Answer.OPEN), shown
 
 
-def slope(rows: Iterable[Seen], from_s: float, to_s: float = math.inf) -> float:
-    """Return how fast the reading moved, in K/s; NaN for less than 3 rows."""
+def slope(
+    rows: Iterable[Seen], from_s: float, to_s: float = math.inf, *, less_sd_k: float = 0.0
+) -> float:
+    """Return how fast the reading moved, in K/s; NaN for less than 3 rows.
+
+    Parameters
+    ----------
+    rows : iterable of Seen
+        Readings; those between `from_s` and `to_s` are meant.
+    from_s, to_s : float
+        Times in s.
+    less_sd_k : float
+        Standard deviation of a reading: with it, the least slope that is still sure.
+    """
     meant = [row for row in rows if from_s <= row.t_s <= to_s]
     if len(meant) < 3:
         return math.nan
     t = np.array([row.t_s for row in meant])
     t = t - t.mean()
     y = np.array([row.reading_c for row in meant])
-    return float(t @ y / (t @ t))
+    squares = float(t @ t)
+    return float(t @ y) / squares - SURE * less_sd_k / math.sqrt(squares)

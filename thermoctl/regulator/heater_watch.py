@@ -39,8 +39,9 @@ HEARD_S, HEARD_LAGS = 20.0, 0.5
 """A good answer is believed from then on, of a heater that is not known, and of one that is;"""
 BAD_S, BAD_LAGS = 60.0, 2.0
 """a bad one from then on."""
-LONGEST_S, LONGEST_LAGS = 240.0, 12.0
-"""A known heater that has not answered by then does not answer."""
+LONGEST_S, LONGEST_LAGS, LONGEST_SDS = 240.0, 12.0, 20.0
+"""A known heater that has not answered by then does not answer; nor before it would have warmed the
+water by so many standard deviations of a reading."""
 UNKNOWN_LAGS = 3.0
 """An unknown one gets another chance after so many of the longest lags, with twice the heat."""
 CHANGED = 0.7
@@ -89,7 +90,7 @@ class HeaterCheck:
 
 
 class _Cut(NamedTuple):
-    """A question that was put: when, what is looked at from when on, and why it was put."""
+    """A question: when it was put, from when on is looked at, and why."""
 
     at_s: float
     from_s: float
@@ -244,7 +245,8 @@ class HeaterWatch:
         known, asked_s = self._known, now.t_s - cut.at_s
         lag_s = LAGS_S[-1] if known is None else known.lag_s
         if known is not None and self._off_s > (OFF_LAGS + 1.0) * lag_s:
-            rate = heat_question.slope(self._rows, now.t_s - max(OFF_LAGS * lag_s, BEFORE_S))
+            from_s = now.t_s - max(OFF_LAGS * lag_s, BEFORE_S)
+            rate = heat_question.slope(self._rows, from_s, less_sd_k=block.sd_k)
             if rate > RISES * known.mean:
                 self._fail("heater.stuck_on", _rises(rate), t_s)
                 return
@@ -259,7 +261,7 @@ class HeaterWatch:
             return
         elif answer is not Answer.OPEN:
             self._refuse(answer, cut, shown, asked_s, t_s)
-        elif known is not None and asked_s > max(LONGEST_LAGS * lag_s, LONGEST_S):
+        elif known is not None and asked_s > _longest_s(known, block.sd_k):
             self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
         elif known is None and asked_s > UNKNOWN_LAGS * lag_s:
             self._patience_s *= 2.0
@@ -317,7 +319,7 @@ class HeaterWatch:
         self._supervisor.fail(code, fault, text, t_s)
         if code == "heater.stuck_on" or self._t_s - self._failed_s < LATELY_S:
             self._supervisor.latch(code, fault, text, t_s)
-        self._failed_s = self._t_s
+        self._failed_s, self._patience_s = self._t_s, self._check.first_heat_s
         if self._known is not None:
             self._distrusted_k = 2.0 * self._known.stored_k
         self._go_on()
@@ -326,6 +328,11 @@ class HeaterWatch:
         self._cut = None
         self._doubt.clear()
         self._begin_trial()
+
+
+def _longest_s(known: Gain, sd_k: float) -> float:
+    """Return how long the answer of a known heater is waited for."""
+    return max(LONGEST_S, LONGEST_LAGS * known.lag_s, LONGEST_SDS * sd_k / known.mean)
 
 
 def _rises(rate: float) -> str:

@@ -1,0 +1,267 @@
+"""The watch over a heater, on a plant of two lines: an integrator with loss behind two lags."""
+
+import math
+from collections import deque
+
+import numpy as np
+import pytest
+
+from thermoctl.app.parts import plan_for
+from thermoctl.app.settings import load
+from thermoctl.errors import ConfigError
+from thermoctl.regulator.heat_blocks import Blocks, Repeats
+from thermoctl.regulator.heat_doubt import Seen
+from thermoctl.regulator.heat_question import Answer, contrast, of_known, of_unknown
+from thermoctl.regulator.heat_response import Block, Gain, HeatResponse
+from thermoctl.regulator.heater_watch import HeaterCheck, HeaterWatch
+from thermoctl.regulator.limits import Limits
+from thermoctl.regulator.supervisor import Supervisor
+from thermoctl.signals import Measurement, State
+
+LIMITS = Limits(200.0, -50.0, -50.0, 200.0)
+
+
+class Plant:
+    """Water, a supervisor and a watch; `power` is what is asked for, `does` what it really does."""
+
+    def __init__(self, gain=0.04, loss=0.008, lag_s=20.0, seed=1, noise_k=0.01, **check):
+        self.gain, self.loss, self.pole_s = gain, loss, lag_s / 2.0
+        self.events = deque()
+        self.supervisor = Supervisor(LIMITS, self.emit)
+        self.watch = HeaterWatch(HeaterCheck(**check), 1.0, self.supervisor, self.emit)
+        self.rng, self.noise_k = np.random.default_rng(seed), noise_k
+        self.t_s, self.water_c, self.applied = 0.0, 25.0, 0.0
+        self.first = self.second = 0.0
+        self.does = lambda power: power
+        self.shows = lambda water_c: water_c
+        self.sign = -1.0 if check.get("action") == "cool" else 1.0
+
+    def emit(self, name, **fields):
+        self.events.append((self.t_s, name, fields))
+
+    def names(self):
+        return [name for _, name, _ in self.events if name.startswith("heater.")]
+
+    def run(self, seconds, power):
+        """Give `power`, a number or a function of the time, wherever nobody forbids it."""
+        for _ in range(round(seconds)):
+            self.first += (self.does(self.applied) - self.first) / self.pole_s
+            self.second += (self.first - self.second) / self.pole_s
+            self.water_c += self.sign * (self.gain * self.second - self.loss)
+            self.t_s += 1.0
+            reading_c = self.shows(self.water_c) + self.noise_k * self.rng.standard_normal()
+            self.supervisor.judge(Measurement(self.t_s, reading_c), self.t_s, 1.0)
+            self.watch.observe(self.t_s, 1.0, reading_c, self.applied)
+            state = self.supervisor.rule(self.t_s, 0.0)
+            asked = power(self.t_s) if callable(power) else power
+            free = state is State.RUN and not self.watch.asks
+            self.applied = asked if free else 0.0
+        return self
+
+
+def steps(t_s):
+    """Return a power that moves between 0 and 60 % every two minutes."""
+    return 0.6 if t_s % 240.0 < 120.0 else 0.0
+
+
+def known(**keys):
+    """Return a plant whose heater has been seen to heat."""
+    plant = Plant(**keys).run(1200, steps)
+    assert plant.names() == []
+    return plant
+
+
+def test_a_healthy_heater_is_never_asked():
+    for seed, gain, lag_s in ((1, 0.04, 20.0), (2, 0.1, 5.0), (3, 0.01, 40.0)):
+        plant = Plant(gain, 0.3 * gain, lag_s, seed).run(5000, steps)
+        assert plant.names() == [], (gain, lag_s)
+
+
+@pytest.mark.parametrize(
+    ("does", "code"),
+    [
+        (lambda power: -power, "heater.reversed"),
+        (lambda power: 0.0, "heater.no_response"),
+        (lambda power: 1.0, "heater.stuck_on"),
+    ],
+    ids=["inverted", "dead", "stuck on"],
+)
+@pytest.mark.parametrize("action", ["heat", "cool"])
+def test_a_heater_that_was_known_is_latched_when_it_does_something_else(does, code, action):
+    plant = known(action=action)
+    plant.does = does
+    plant.run(900, steps)
+    assert plant.supervisor.state is State.LATCHED
+    assert plant.names()[-1] == code
+    assert plant.applied == 0.0
+
+
+def test_the_first_verdict_is_safe_and_the_second_within_half_an_hour_latches():
+    plant = known()
+    plant.does = lambda power: -power
+    while "heater.reversed" not in plant.names():
+        plant.run(1, 0.6)
+    assert plant.supervisor.state is State.SAFE
+    assert plant.supervisor.alarms.latched() == ()
+    while plant.supervisor.state is not State.LATCHED:
+        plant.run(1, 0.6)
+    assert plant.names().count("heater.questioned") == 2
+
+
+@pytest.mark.parametrize(
+    ("does", "code"),
+    [(lambda power: -power, "heater.reversed"), (lambda power: 0.0, "heater.no_response")],
+    ids=["inverted", "dead"],
+)
+def test_a_heater_that_was_never_known_has_a_minute_of_full_power(does, code):
+    plant = Plant(loss=0.0, weakest_k_per_s=0.005)
+    plant.does = does
+    plant.run(59, 1.0)
+    assert not plant.watch.asks
+    plant.run(10, 1.0)
+    assert plant.watch.asks
+    assert plant.applied == 0.0
+    plant.run(900, 1.0)
+    assert plant.supervisor.state is State.LATCHED
+    assert plant.names()[-1] == code
+
+
+def test_a_heater_at_its_limit_is_asked_once_and_goes_on():
+    plant = Plant(gain=0.01, loss=0.01).run(7200, 1.0)
+    assert plant.names() == ["heater.questioned", "heater.answered"]
+    assert plant.applied == 1.0
+
+
+def test_fifty_watts_in_two_hundred_litres_are_a_heater():
+    plant = Plant(gain=6e-5, loss=0.0, lag_s=20.0).run(4 * 3600, 1.0)
+    assert set(plant.names()) <= {"heater.questioned", "heater.answered"}
+    assert plant.supervisor.state is State.RUN
+
+
+def test_a_litre_of_cold_water_is_no_fault():
+    plant = known()
+    plant.water_c -= 4.0
+    plant.run(1200, lambda t_s: 1.0 if plant.water_c < 38.0 else 0.2)
+    assert plant.names() == []
+
+
+def test_a_sensor_that_has_fallen_out_ends_the_heat():
+    plant = known()
+    fell_s, there_c = plant.t_s, plant.water_c
+    plant.shows = lambda _: 22.0 + (there_c - 22.0) * math.exp(-(plant.t_s - fell_s) / 60.0)
+    began_c = plant.water_c
+    plant.run(900, 1.0)
+    assert plant.supervisor.state is State.LATCHED
+    assert plant.water_c < began_c + 8.0
+
+
+def test_a_gap_of_which_the_power_is_unknown_ends_a_question():
+    plant = known()
+    plant.does = lambda power: 0.0
+    while not plant.watch.asks:
+        plant.run(1, 0.6)
+    plant.watch.observe(plant.t_s + 600.0, 600.0, plant.water_c, 0.0)
+    assert not plant.watch.asks
+
+
+# -- parts ---------------------------------------------------------------------------------------
+
+
+def test_gain_and_lag_are_learnt_from_powers_that_move_whatever_drifts():
+    rng, response = np.random.default_rng(5), HeatResponse()
+    first = second = heat_s = 0.0
+    for n in range(500):
+        power = 0.8 if n % 60 < 30 else 0.1
+        first += -math.expm1(-4.0 / 22.5) * (power - first)
+        second += -math.expm1(-4.0 / 22.5) * (first - second)
+        heat_s += 4.0 * second
+        reading_c = 20.0 + 0.02 * heat_s - 0.004 * 4.0 * n + 0.01 * rng.standard_normal()
+        response.observe(Block(4.0, power, reading_c, 0.01), learn=True)
+    gain = response.gain
+    assert gain.lag_s == 45.0
+    assert abs(gain.mean - 0.02) < 3.0 * gain.sd < 0.004
+
+
+def rows(beta, drift, n=40, place=2, seed=3, bend=0.0):
+    """Return readings with power for half of the time, and without for the rest."""
+    rng = np.random.default_rng(seed)
+    response, seen = HeatResponse(), []
+    for k in range(n):
+        response.observe(Block(4.0, 1.0 if k < n // 2 else 0.0, 20.0, 0.01), learn=False)
+        t_s, heat_s = 4.0 * k, float(response.heat_s[place])
+        reading_c = 20.0 + drift * t_s + bend * t_s**2 + beta * heat_s
+        seen.append(Seen(t_s, reading_c + 0.005 * rng.standard_normal(), response.heat_s))
+    return seen
+
+
+@pytest.mark.parametrize("drift", [-0.01, 0.0, 0.01])
+@pytest.mark.parametrize("bend", [-2e-5, 0.0, 2e-5])
+@pytest.mark.parametrize(
+    ("beta", "answer"),
+    [(0.03, Answer.HEATS), (0.0, Answer.NOTHING), (-0.03, Answer.COOLS)],
+)
+def test_a_question_is_answered_whatever_drifts(beta, answer, drift, bend):
+    found = contrast(rows(beta, drift, bend=bend), 0.005)
+    assert of_known(found, Gain(0.03, 0.003, 2))[0] is answer
+    assert of_unknown(found, 0.02, drift)[0] is answer
+
+
+def test_a_gain_below_the_resolution_is_no_answer():
+    found = contrast(rows(0.0, 0.0), 0.005)
+    assert of_unknown(found, 6e-5, 0.0)[0] is Answer.OPEN
+    assert contrast(rows(0.0, 0.0, n=5), 0.005) is None
+
+
+def test_a_block_has_the_mean_of_its_readings_and_none_without_any():
+    blocks = Blocks(1.0)
+    made = [blocks.add(1.0, reading_c, 0.5) for reading_c in (20.0, math.nan, 21.0, math.nan)]
+    assert made[:3] == [None] * 3
+    assert made[3][:3] == (4.0, 0.5, 20.5)
+    for _ in range(3):
+        blocks.add(1.0, math.nan, 1.0)
+    assert math.isnan(blocks.add(1.0, math.nan, 1.0).reading_c)
+
+
+def test_equal_readings_are_a_fault_only_where_noise_is_larger_than_a_step():
+    rng = np.random.default_rng(7)
+    fine, coarse = Repeats(), Repeats()
+    for n in range(5000):
+        water_c = 37.0 + 0.1 * math.sin(n / 300.0)
+        noise_k = 0.02 * rng.standard_normal()
+        assert not fine.observe(round((water_c + noise_k) / 0.015) * 0.015)
+        assert not coarse.observe(round((water_c + noise_k) / 0.488) * 0.488)
+    stuck = [fine.observe(37.02) for _ in range(60)]
+    assert 10 <= stuck.index(True) <= 40
+    assert not any(coarse.observe(37.088) for _ in range(600))
+
+
+# -- configuration -------------------------------------------------------------------------------
+
+LOOP = {"setpoint_c": 37.5, "trip_above_c": 60.0}
+
+
+def plan(**keys):
+    return plan_for(load({"loops": {"tank": LOOP | keys}}).loops["tank"])
+
+
+def test_a_loop_is_checked_unless_it_says_otherwise():
+    assert plan().heater_check == HeaterCheck()
+    assert plan(heater_check={"enabled": False}).heater_check is None
+    assert plan(controller={"kind": "pid", "action": "cool"}).heater_check.action == "cool"
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("weakest_k_per_s", 0.0), ("weakest_k_per_s", 2.0), ("first_heat_s", 1.0), ("wekaest", 1.0)],
+)
+def test_a_bad_option_is_refused_by_its_name(key, value):
+    with pytest.raises(ConfigError, match=key):
+        plan(heater_check={key: value})
+
+
+@pytest.mark.parametrize(
+    "keys", [{"weakest_k_per_s": math.nan}, {"first_heat_s": 0.0}, {"action": "warm"}]
+)
+def test_a_check_that_makes_no_sense_is_refused(keys):
+    with pytest.raises(ValueError, match=next(iter(keys))):
+        HeaterCheck(**keys)
