@@ -158,7 +158,7 @@ def _within(name: str, table: BaseModel) -> Iterator[None]:
 
 
 def _heater_check(table: LoopTable, controller: Controller) -> HeaterCheck | None:
-    """Return how the heater is checked; not with a cooler beside it, nor without an output."""
+    """Return how the heater is checked; not beside a cooler or without output."""
     check = table.heater_check
     drives = table.actuator is None or isinstance(table.actuator, ActuatorTable)
     if not check.enabled or table.cooler is not None or not drives:
