@@ -1,4 +1,4 @@
-r"""The question to a heater in doubt: what does the reading do without power?
+r"""The question to a heater in doubt: what the reading does without power.
 
 To cut the power is always safe, and it tells what watching cannot: whatever cools or warms the
 reading besides goes on as before, and only the heater's part ends. The answer is the gain beta in
