@@ -14,12 +14,11 @@ no more in a block than a heater could do, so that a litre of cold water is soon
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
-from thermoctl.quantities import Array, clamp
-from thermoctl.regulator.heat_response import LAGS_S, Block, Gain
+from thermoctl.quantities import clamp
+from thermoctl.regulator.heat_response import LAGS_S, Block, Gain, Heat
 
 LEAST_K, SDS, LAGS = 0.3, 5.0, 1.0
 """A sum is a doubt beyond these: in K, in standard deviations of a reading, in rises of a lag."""
@@ -50,7 +49,7 @@ class Seen(NamedTuple):
 
     t_s: float
     reading_c: float
-    heat_s: Array
+    heat_s: Heat
 
 
 class HeatDoubt:
@@ -63,7 +62,7 @@ class HeatDoubt:
     """
 
     def __init__(self) -> None:
-        self._rates: Array = np.zeros(len(LAGS_S))
+        self._rates: Heat = (0.0,) * len(LAGS_S)
         self._rise_rate = 0.0
         self._known_s = 0.0
         self._stood_c = math.nan
@@ -83,7 +82,7 @@ class HeatDoubt:
 
     def loss(self, gain: Gain) -> float:
         """Return how fast the reading should fall without power, in K/s."""
-        return gain.mean * float(self._rates[gain.place]) - self._rise_rate
+        return gain.mean * self._rates[gain.place] - self._rise_rate
 
     def calm(self, gain: Gain, sd_k: float) -> bool:
         """Return whether nothing is in doubt, so that gain and loss may be learnt."""
@@ -102,8 +101,8 @@ class HeatDoubt:
     ) -> None:
         """Add what happened from `before` to `now`; quiet rates `follow` if they may."""
         span_s, rise_k = now.t_s - before.t_s, now.reading_c - before.reading_c
-        heat_s = now.heat_s - before.heat_s
-        heat_k, full_k = gain.mean * float(heat_s[gain.place]), gain.mean * span_s
+        heat_s = [after - was for after, was in zip(now.heat_s, before.heat_s, strict=True)]
+        heat_k, full_k = gain.mean * heat_s[gain.place], gain.mean * span_s
         loss_k = self.loss(gain) * span_s
         missing_k = clamp(heat_k - loss_k - rise_k, -2.0 * full_k, heat_k)
         missing_k += self._missing_k - HALF * heat_k - FULL_SHARE * full_k
@@ -117,16 +116,16 @@ class HeatDoubt:
             self._extra_k = max(0.0, self._extra_k + extra_k)
         if follow and not jumped and self.calm(gain, block.sd_k):
             rise_k = clamp(rise_k, -full_k, full_k)
-            self._follow(gain, heat_s / span_s, rise_k / span_s, span_s)
+            self._follow(gain, heat_s, rise_k, span_s)
         self._creep(gain, now.reading_c, block)
 
-    def _follow(self, gain: Gain, rates: Array, rise_rate: float, span_s: float) -> None:
+    def _follow(self, gain: Gain, heat_s: Sequence[float], rise_k: float, span_s: float) -> None:
         """Let the quiet rates follow those of a block."""
         self._known_s += span_s
-        memory_s = max(MEMORY_S, MEMORY_LAGS * gain.lag_s)
-        share = span_s / min(self._known_s, memory_s)
-        self._rates = self._rates + share * (rates - self._rates)
-        self._rise_rate += share * (rise_rate - self._rise_rate)
+        share = span_s / min(self._known_s, max(MEMORY_S, MEMORY_LAGS * gain.lag_s))
+        pairs = zip(self._rates, heat_s, strict=True)
+        self._rates = tuple([rate + share * (heat / span_s - rate) for rate, heat in pairs])
+        self._rise_rate += share * (rise_k / span_s - self._rise_rate)
 
     def _creep(self, gain: Gain, reading_c: float, block: Block) -> None:
         """Notice a loss that grows while the reading stands still."""
@@ -150,7 +149,7 @@ class HeatDoubt:
         if since is None or not now.t_s > since.t_s:
             return "expected a reading that answers to the power"
         span_s = now.t_s - since.t_s
-        heat_s = float(now.heat_s[gain.place] - since.heat_s[gain.place])
+        heat_s = now.heat_s[gain.place] - since.heat_s[gain.place]
         expected_k = gain.mean * heat_s - loss * span_s
         sd_k = math.hypot((gain.sd + 0.1 * gain.mean) * heat_s, 0.1 * gain.stored_k)
         return (

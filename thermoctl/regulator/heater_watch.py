@@ -44,13 +44,18 @@ LONGEST_S, LONGEST_LAGS, LONGEST_SDS = 240.0, 12.0, 20.0
 water by so many standard deviations of a reading."""
 UNKNOWN_LAGS = 3.0
 """An unknown one gets another chance after so many of the longest lags, with twice the heat."""
-CHANGED = 0.7
-"""A gain below this share of the one that was known is the new one."""
+CHANGED, AT_ONCE = 0.7, 3.0
+"""A gain below this share of the one that was known is the new one; so is one as far above it, but no
+more than so many times the old one at once."""
+WILD = 1.3
+"""A reading that falls faster than a heater which cools this much better than it heated: ice in the
+water, or a sensor in the air. What follows the cut is then no answer."""
 LATELY_S = 1800.0
 """A second verdict within this time latches."""
 ROWS = 450
 """Blocks that are remembered: half an hour at a second's period."""
 
+_WILD_TEXT = "the reading fell faster than any heater can make it, so the cut says nothing"
 _NOT_SEEN = Gain(math.nan, math.nan, 0)
 _FAULTS = {"heater.no_response": 23, "heater.reversed": 3, "heater.stuck_on": 24}
 
@@ -200,7 +205,7 @@ class HeaterWatch:
         gain = self._response.gain
         if gain is None or gain is self._known or gain.mean <= SURE * gain.sd:
             return
-        if float(now.heat_s[gain.place]) > ARRIVED_LAGS * gain.lag_s:
+        if now.heat_s[gain.place] > ARRIVED_LAGS * gain.lag_s:
             self._known = gain
 
     def _try(self, block: Block, now: Seen) -> None:
@@ -224,7 +229,7 @@ class HeaterWatch:
         doubt.compare(known, block, before, now, jumped=jumped, follow=self._distrusted_k <= 0.0)
         if self._distrusted_k > 0.0 and doubt.calm(known, sd_k):
             place = known.place
-            self._distrusted_k -= known.mean * float(now.heat_s[place] - before.heat_s[place])
+            self._distrusted_k -= known.mean * (now.heat_s[place] - before.heat_s[place])
         hot = doubt.hot(known, sd_k)
         if hot and self._off_s >= OFF_LAGS * known.lag_s:
             rows = self._rows
@@ -259,6 +264,10 @@ class HeaterWatch:
                 self._accept(shown, asked_s)
         elif asked_s < bad_s:
             return
+        elif known is not None and self._wild(known, cut.from_s, cut.at_s):
+            if not self._wild(known, now.t_s - max(lag_s, BEFORE_S), now.t_s, 0.5):
+                self._emit("heater.answered", text=_WILD_TEXT)
+                self._go_on()
         elif answer is not Answer.OPEN:
             self._refuse(answer, cut, shown, asked_s, t_s)
         elif known is not None and asked_s > _longest_s(known, block.sd_k):
@@ -292,6 +301,11 @@ class HeaterWatch:
         turned = {Answer.HEATS: after < before, Answer.COOLS: after > before}
         return (answer if turned.get(answer, True) else Answer.OPEN), shown
 
+    def _wild(self, known: Gain, from_s: float, to_s: float, gains: float = WILD) -> bool:
+        """Return whether the reading fell faster than loss and so many `gains` together."""
+        fell = -heat_question.slope(self._rows, from_s, to_s)
+        return fell > max(self._doubt.loss(known), 0.0) + gains * known.mean
+
     def _accept(self, shown: Gain, asked_s: float) -> None:
         """Go on with a heater that heats, and with the gain it has shown if that is news."""
         text = f"{asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s"
@@ -299,6 +313,8 @@ class HeaterWatch:
         known = self._known
         if known is None or shown.mean < CHANGED * known.mean:
             self._known = known = shown
+        elif shown.mean > known.mean / CHANGED:
+            self._known = known = known._replace(mean=min(shown.mean, AT_ONCE * known.mean))
         self._doubt.trust(known)
         self._patience_s = self._check.first_heat_s
         self._distrusted_k = 0.0
