@@ -45,8 +45,8 @@ water by so many standard deviations of a reading."""
 UNKNOWN_LAGS = 3.0
 """An unknown one gets another chance after so many of the longest lags, with twice the heat."""
 CHANGED, AT_ONCE = 0.7, 3.0
-"""A gain below this share of the one that was known is the new one; so is one as far above it, but no
-more than so many times the old one at once."""
+"""A gain below this share of the one that was known is the new one; so is one as far above it, but
+no more than so many times the old one at once."""
 WILD = 1.3
 """A reading that falls faster than a heater which cools this much better than it heated: ice in the
 water, or a sensor in the air. What follows the cut is then no answer."""
