@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from thermoctl.control.adaptive import trial
 from thermoctl.control.adaptive.bank import Bank, BankBelief
@@ -37,6 +37,17 @@ DOUBTFUL_GAIN = 2.0 * GAIN_MIN
 """With less at full power, in K/s, the gain rests on its bound: 200 l at 33 W, or no heater."""
 
 
+SDS_EVERY = 5
+"""Standard deviations change slowly: they are reckoned anew after so many samples."""
+
+
+class Sds(NamedTuple):
+    """Standard deviations: of the gain, in K/s, and of the holding power."""
+
+    gain: float = math.nan
+    holding_power: float = math.inf
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class AdaptiveBelief:
     """What the controller remembers.
@@ -53,6 +64,8 @@ class AdaptiveBelief:
         Whether power seems to warm nothing.
     memory : Memory
         What has become of a model that was remembered from an earlier run.
+    sds : Sds
+        How well gain and holding power were known, at most `SDS_EVERY` samples ago.
     """
 
     bank: BankBelief
@@ -61,6 +74,7 @@ class AdaptiveBelief:
     given_s: float = 0.0
     doubt: Lasting = field(default_factory=Lasting)
     memory: Memory = field(default_factory=Memory)
+    sds: Sds = field(default_factory=Sds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,12 +183,23 @@ class Adaptive:
             behind_s, power = h, 0.0
         periods = math.floor(behind_s / h + 0.5)
         if periods < 1:
-            return AdaptiveBelief(bank, behind_s, since_s, given_s, belief.doubt, memory)
+            return AdaptiveBelief(
+                bank, behind_s, since_s, given_s, belief.doubt, memory, belief.sds
+            )
         for _ in range(periods - 1):
             bank, memory = trial.met(self.bank, bank, memory, math.nan, power)
         bank, memory = trial.met(self.bank, bank, memory, reading_c, power)
         doubt = belief.doubt.after(_doubt(bank.outlook))
-        return AdaptiveBelief(bank, behind_s - periods * h, doubt=doubt, memory=memory)
+        due = bank.block is not None and bank.sample % SDS_EVERY == 0
+        sds = self._sds(bank, memory) if due else belief.sds
+        return AdaptiveBelief(bank, behind_s - periods * h, doubt=doubt, memory=memory, sds=sds)
+
+    def _sds(self, bank: BankBelief, memory: Memory) -> Sds:
+        """Return how well gain and holding power are known; on trial no better than when new."""
+        gain_sd, rival = gain(self.bank, bank)[1], memory.rival
+        if rival is not None and rival.block is not None:
+            gain_sd = max(gain_sd, gain(self.bank, rival)[1])
+        return Sds(gain_sd, holding_power_sd(bank))
 
     def decide(self, belief: AdaptiveBelief, situation: Situation) -> tuple[AdaptiveBelief, float]:
         """Return the power that lets the water come to rest at the set point."""
@@ -203,16 +228,13 @@ class Adaptive:
 
     def beliefs(self, belief: AdaptiveBelief, situation: Situation) -> Beliefs:
         """Return gain with its error, lag, and holding power once it is known to .05."""
-        bank, outlook = belief.bank, belief.bank.outlook
+        outlook, sds = belief.bank.outlook, belief.sds
         if outlook is None:
             return Beliefs()
-        rate, rate_sd = gain(self.bank, bank)
-        rival = belief.memory.rival
-        if rival is not None and rival.block is not None:  # on trial it is no better known than new
-            rate_sd = max(rate_sd, gain(self.bank, rival)[1])
-        known = holding_power_sd(bank) <= HOLDING_SD_MAX
+        known = sds.holding_power <= HOLDING_SD_MAX
         holding_power = self._power(outlook.holding_power) if known else None
-        return Beliefs(self._sign * rate, rate_sd, holding_power=holding_power, lag_s=outlook.lag_s)
+        rate, lag_s = self._sign * outlook.gain, outlook.lag_s
+        return Beliefs(rate, sds.gain, holding_power=holding_power, lag_s=lag_s)
 
     def plant(self, belief: AdaptiveBelief) -> PlantBelief | None:
         """Return everything believed of the plant; None before the first valid reading."""
