@@ -47,9 +47,9 @@ UNKNOWN_LAGS = 3.0
 CHANGED, AT_ONCE = 0.7, 3.0
 """A gain below this share of the one that was known is the new one; so is one as far above it, but
 no more than so many times the old one at once."""
-WILD = 1.3
+WILD, RESTS = 1.3, 0.5
 """A reading that falls faster than a heater which cools this much better than it heated: ice in the
-water, or a sensor in the air. What follows the cut is then no answer."""
+water, or a sensor in the air. What follows the cut is then no answer; it is over at the second."""
 LATELY_S = 1800.0
 """A second verdict within this time latches."""
 ROWS = 450
@@ -95,11 +95,12 @@ class HeaterCheck:
 
 
 class _Cut(NamedTuple):
-    """A question: when it was put, from when on is looked at, and why."""
+    """When a question was put, what it looks at, why, and if readings were wild."""
 
     at_s: float
     from_s: float
     why: str
+    wild: bool = False
 
 
 class HeaterWatch:
@@ -236,13 +237,15 @@ class HeaterWatch:
             rate = heat_question.slope(rows, self._t_s - OFF_LAGS * known.lag_s)
             self._fail("heater.stuck_on", _rises(rate), t_s)
         elif hot or (doubt.cold(known, sd_k) and block.power >= OFF):
-            before_s = max(BEFORE_LAGS * known.lag_s, BEFORE_S)
-            self._ask(now, self._t_s - before_s, doubt.told(known, now))
+            from_s = self._t_s - max(BEFORE_LAGS * known.lag_s, BEFORE_S)
+            since_s = from_s if doubt.since is None else min(doubt.since.t_s, from_s)
+            wild = self._wild(known, since_s, WILD) or self._wild(known, from_s, WILD)
+            self._ask(now, from_s, doubt.told(known, now), wild=wild)
 
     # -- a question ------------------------------------------------------------------------------
 
-    def _ask(self, now: Seen, from_s: float, why: str) -> None:
-        self._cut = _Cut(now.t_s, from_s, why)
+    def _ask(self, now: Seen, from_s: float, why: str, *, wild: bool = False) -> None:
+        self._cut = _Cut(now.t_s, from_s, why, wild)
         self._emit("heater.questioned", text=f"{why}; power is cut to see what it does")
 
     def _hear(self, cut: _Cut, block: Block, now: Seen, t_s: float) -> None:
@@ -264,8 +267,8 @@ class HeaterWatch:
                 self._accept(shown, asked_s)
         elif asked_s < bad_s:
             return
-        elif known is not None and self._wild(known, cut.from_s, cut.at_s):
-            if not self._wild(known, now.t_s - max(lag_s, BEFORE_S), now.t_s, 0.5):
+        elif known is not None and cut.wild:
+            if not self._wild(known, now.t_s - max(lag_s, BEFORE_S), RESTS):
                 self._emit("heater.answered", text=_WILD_TEXT)
                 self._go_on()
         elif answer is not Answer.OPEN:
@@ -301,9 +304,9 @@ class HeaterWatch:
         turned = {Answer.HEATS: after < before, Answer.COOLS: after > before}
         return (answer if turned.get(answer, True) else Answer.OPEN), shown
 
-    def _wild(self, known: Gain, from_s: float, to_s: float, gains: float = WILD) -> bool:
+    def _wild(self, known: Gain, from_s: float, gains: float) -> bool:
         """Return whether the reading fell faster than loss and so many `gains` together."""
-        fell = -heat_question.slope(self._rows, from_s, to_s)
+        fell = -heat_question.slope(self._rows, from_s)
         return fell > max(self._doubt.loss(known), 0.0) + gains * known.mean
 
     def _accept(self, shown: Gain, asked_s: float) -> None:
