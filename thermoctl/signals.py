@@ -75,6 +75,7 @@ class Measurement:
     t_s: float
     temperature_c: float = math.nan
     quality: Quality = Quality.GOOD
+    ends_c: tuple[float, float] | None = None  # of two sensors the lower and the higher reading
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ from thermoctl.signals import RawSample
 from thermoctl_drivers.outputs import commanded
 
 INPUT = "temperature"
+SECOND_INPUT = "temperature2"
 ELEMENT = "element"
 OUTPUT = "heater"
 COOLER = "cooler"
@@ -65,6 +66,13 @@ class SimulatedSettings(BaseModel):
         description="Time from heater to sensor, in s; left out: by the size of the tank.",
     )
     sensor_lag_s: float = Field(6.0, ge=0.5, le=120.0, description="Lag of the sensor, in s.")
+    second_sensor: bool = Field(
+        False, description="Whether a second LM335 is in the water, as input `temperature2`."
+    )
+    second_lag_s: float = Field(6.0, ge=0.5, le=120.0, description="Its lag, in s.")
+    second_gain_error: float = Field(
+        0.0, ge=-0.05, le=0.05, description="Its relative error; .001 is 0.3 K in warm water."
+    )
     tolerances: float = Field(
         0.0, ge=0.0, le=0.3, description="Spread of what varies between specimens; 0.1 is 10 %."
     )
@@ -90,8 +98,9 @@ class SimulatedBoard:
     """Inputs and outputs on a simulated tank; a `Board` that is `Simulated`.
 
     The input ``temperature`` is the sum of a burst of conversions of an LM335, and so is
-    ``element``, where the heater has a sensor of its own. The output ``heater`` is the drive of the
-    power stage, a fraction in [0, 1]; where there is a cooler, ``cooler`` is the share of its heat.
+    ``temperature2`` and ``element``, where there is a second sensor and one on the heater. The
+    output ``heater`` is the drive of the power stage, in [0, 1]; where there is a cooler,
+    ``cooler`` is the share of its heat.
 
     Parameters
     ----------
@@ -113,8 +122,8 @@ class SimulatedBoard:
 
     def __init__(self, settings: SimulatedSettings, link: Link | None, clock: Clock) -> None:
         del link  # every driver is built alike; this one has nothing to talk to
-        rngs = np.random.default_rng(settings.seed).spawn(4)
-        tank_rng, specimen_rng, input_rng, element_rng = rngs
+        rngs = np.random.default_rng(settings.seed).spawn(5)
+        tank_rng, specimen_rng, input_rng, element_rng, second_rng = rngs
         try:
             parameters = specimen(_tank_parameters(settings), specimen_rng, settings.tolerances)
             acquisition = _acquisition_parameters(settings)
@@ -124,6 +133,7 @@ class SimulatedBoard:
         self._tank = Tank(parameters, tank_rng, STAGES[settings.power_stage])
         self._acquisition = Acquisition(acquisition, input_rng)
         self._element = Acquisition(acquisition, element_rng) if settings.element_sensor else None
+        self._second = Acquisition(acquisition, second_rng) if settings.second_sensor else None
         self._full_scale = float(acquisition.full_scale)
         self._drive_steps = 2**settings.dac_bits - 1
         self._is_open = False
@@ -167,6 +177,10 @@ class SimulatedBoard:
         else:
             self._last_good_s = self._now_s
             samples[INPUT] = self._sample(self._acquisition, volts)
+        if self._second is not None and self._tank.second is not None:
+            second_v = self._tank.second.volts()
+            if not math.isnan(second_v):
+                samples[SECOND_INPUT] = self._sample(self._second, second_v)
         if self._element is not None:
             element_v = LM335.volts(self._tank.temperatures.element_c)
             samples[ELEMENT] = self._sample(self._element, element_v)
@@ -279,9 +293,9 @@ class SimulatedBoard:
             self._counters["dead_man"] += any(self._drives.values())
             self._switch_off()
             self._tank.advance(interval_s - driven_s, 0.0)
-        self._acquisition.advance(interval_s)
-        if self._element is not None:
-            self._element.advance(interval_s)
+        for each in (self._acquisition, self._element, self._second):
+            if each is not None:
+                each.advance(interval_s)
         self._now_s = now_s
 
 
@@ -295,15 +309,18 @@ def _tank_parameters(settings: SimulatedSettings) -> TankParameters:
         ice_kg=settings.ice_kg,
     )
     transport_s = settings.transport_s
+    probe = replace(
+        scaled.probe,
+        lag_s=settings.sensor_lag_s,
+        transport_s=scaled.probe.transport_s if transport_s is None else transport_s,
+    )
+    second = replace(probe, lag_s=settings.second_lag_s, gain_error=settings.second_gain_error)
     return replace(
         scaled,
         element=replace(scaled.element, lag_s=settings.element_lag_s),
         cooler=Cooler(settings.cooler_w, settings.cooler_lag_s),
-        probe=replace(
-            scaled.probe,
-            lag_s=settings.sensor_lag_s,
-            transport_s=scaled.probe.transport_s if transport_s is None else transport_s,
-        ),
+        probe=probe,
+        second=second if settings.second_sensor else None,
     )
 
 

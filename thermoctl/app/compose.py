@@ -29,7 +29,7 @@ from thermoctl.regulator.recollection import NOTHING
 from thermoctl.runtime.cascade import Lead
 from thermoctl.runtime.connection import Connection
 from thermoctl.runtime.loop import Loop, Publish
-from thermoctl.runtime.wiring import Output, Wiring
+from thermoctl.runtime.wiring import Input, Output, Wiring
 from thermoctl.signals import Alarm, Mode
 
 _WRITE_TIMEOUT_S = 0.5
@@ -204,18 +204,21 @@ def _wiring(
     name: str, table: LoopTable, boards: dict[str, Connection], regulator: Regulator
 ) -> Wiring:
     sensor, actuator, cooler = table.sensor, table.actuator, table.cooler
+    other = table.second_sensor
     if sensor is None or actuator is None:
         raise ConfigError(f"loop {name!r} needs a sensor and an actuator to run")
     read = name, regulator, boards[sensor.board], sensor.input, sensor_for(sensor)
+    second = None if other is None else Input(boards[other.board], other.input, sensor_for(other))
     if isinstance(actuator, CascadeTable):
         lead = Lead(actuator.loop, actuator.low_c, actuator.high_c)
-        return Wiring(*read, None, "", Linear(), lead=lead)
+        return Wiring(*read, None, "", Linear(), lead=lead, second=second)
     return Wiring(
         *read,
         boards[actuator.board],
         actuator.output,
         law_for(actuator),
         None if cooler is None else Output(boards[cooler.board], cooler.output, law_for(cooler)),
+        second=second,
     )
 
 

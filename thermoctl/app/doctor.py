@@ -212,9 +212,11 @@ class _Visit:
             self._clock.sleep_until(self._clock.now_s() + _POLL_S)  # the first burst takes a while
             samples = dict(board.read(deadline_s))
         for loop, table in self._settings.loops.items():
-            if table.sensor is not None and table.sensor.board == self._name:
-                name = table.sensor.input
-                measurement = sensor_for(table.sensor).measure(samples.get(name))
+            for sensor in (table.sensor, table.second_sensor):
+                if sensor is None or sensor.board != self._name:
+                    continue
+                name = sensor.input
+                measurement = sensor_for(sensor).measure(samples.get(name))
                 if measurement.quality is Quality.GOOD:
                     text = f"{name} of loop {loop}: {measurement.temperature_c:.2f} °C"
                     yield Finding(OK, self._check, text)

@@ -71,6 +71,7 @@ def plan_for(table: LoopTable) -> Plan:
             shadow,
             table.setpoint_rate_k_per_s,
             _heater_check(table, controller),
+            table.disagreement_k,
         )
 
 
@@ -79,6 +80,8 @@ def check_parts(table: LoopTable) -> None:
     plan_for(table)
     if table.sensor is not None:
         _check_reach(table, sensor_for(table.sensor))
+    if table.second_sensor is not None:
+        _check_second(table, table.second_sensor)
     for output in table.outputs:
         law_for(output)
 
@@ -121,6 +124,17 @@ def _check_reach(table: LoopTable, sensor: curves.Sensor) -> None:
     if "trip_below_c" in table.model_fields_set and not table.trip_below_c > coldest_c:
         text = f"expected more than the {coldest_c:.1f} °C that the sensor shows at least"
         raise BadOption(f"{text}, got {table.trip_below_c:g}", ("trip_below_c",))
+
+
+def _check_second(table: LoopTable, second: SensorTable) -> None:
+    """Refuse a second sensor that is the first one again, or could not show a trip."""
+    path, first = ("second_sensor",), table.sensor
+    if first is None:
+        raise BadOption("expected a table [loops.NAME.sensor] beside it, got none", path)
+    if (second.board, second.input) == (first.board, first.input):
+        text = f"expected another input than the first sensor's, got {second.input!r}"
+        raise BadOption(f"{text} of {second.board!r} twice", (*path, "input"))
+    _check_reach(table, sensor_for(second, "second_sensor"))
 
 
 def reach_c(sensor: curves.Sensor) -> tuple[float, float]:
@@ -290,9 +304,9 @@ def _controller(table: LoopTable, chosen: Options, structure: Arx | KnownGain) -
     return controller
 
 
-def sensor_for(table: SensorTable) -> curves.Sensor:
-    """Return the sensor a table describes; raise `BadOption` if it describes none."""
-    with _within("sensor", table):
+def sensor_for(table: SensorTable, name: str = "sensor") -> curves.Sensor:
+    """Return the sensor of the table `name`; raise `BadOption` if it describes none."""
+    with _within(name, table):
         return curves.Sensor(
             _conversion(table),
             table.reference_v,

@@ -148,7 +148,7 @@ class _Reading:
     def _board_names(self, loop: str, table: Mapping[str, Any]) -> None:
         """Blame a channel whose board has no table; a board that is bad is blamed for itself."""
         boards = self._document.content.get("boards", {})
-        for part in ("sensor", "actuator", "cooler"):
+        for part in ("sensor", "second_sensor", "actuator", "cooler"):
             channel = table.get(part)
             board = channel.get("board") if isinstance(channel, Mapping) else None
             if isinstance(board, str) and board not in boards:

@@ -16,7 +16,7 @@ from thermoctl.errors import ConfigError
 from thermoctl.quantities import clamp
 from thermoctl.runtime.clock import SimulatedClock
 from thermoctl.signals import Cycle, Mode
-from thermoctl_drivers.simulated import SimulatedSettings
+from thermoctl_drivers.simulated import SECOND_INPUT, SimulatedSettings
 
 WATER_J_PER_LK = 4186.0  # heat of a litre of water, in J/K
 _STAND_IN_W = 1500.0
@@ -128,6 +128,7 @@ def _tank_for(board: str, settings: Settings, mains_hz: float) -> SimulatedSetti
                     ice_kg=0.0 if _cooling_share(table) else None,
                     bits=12,
                     power_stage=table.outputs[0].law,
+                    second_sensor=table.second_sensor is not None,
                     mains_hz=mains_hz,
                 )
             except ValidationError as error:
@@ -149,7 +150,14 @@ def _rewired(table: LoopTable, tanks: Mapping[str, SimulatedSettings]) -> LoopTa
     cooler = table.cooler
     if cooler is not None and cooler.board in tanks:
         cooler = cooler.model_copy(update=_COOLER)
-    return table.model_copy(update={"sensor": sensor, "actuator": actuator, "cooler": cooler})
+    second = table.second_sensor
+    if second is not None and sensor is not None:
+        if sensor.board in tanks:
+            second = sensor.model_copy(update={"input": SECOND_INPUT})  # they are in one tank
+        elif second.board in tanks:
+            raise ConfigError("a simulated sensor has its second one on simulated boards only")
+    parts = {"sensor": sensor, "second_sensor": second, "actuator": actuator, "cooler": cooler}
+    return table.model_copy(update=parts)
 
 
 def _cooling_share(table: LoopTable) -> float:

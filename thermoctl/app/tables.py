@@ -270,6 +270,16 @@ class LoopTable(Table):
         "that the controller believes in.",
     )
     sensor: SensorTable | None = None
+    second_sensor: SensorTable | None = Field(
+        None,
+        description="Table `[loops.NAME.second_sensor]`, as the first: another sensor of the same "
+        "plant, on this or another board; none when absent.",
+    )
+    disagreement_k: Positive = Field(
+        1.0,
+        description="How far apart two sensors may be, beside what their lags explain, before the "
+        "hotter one alone is followed and an alarm says so.",
+    )
     actuator: Actuator | None = Field(
         None,
         description="Table `[loops.NAME.actuator]`: which output, and how power becomes its drive; "

@@ -128,7 +128,8 @@ def plan(
 def alone(settings: Settings, name: str) -> Settings:
     """Return `settings` with the loop `name` only, in mode manual, and its boards."""
     table = settings.loop(name)[1]
-    used = {part.board for part in (table.sensor, *table.outputs) if part is not None}
+    parts = (table.sensor, table.second_sensor, *table.outputs)
+    used = {part.board for part in parts if part is not None}
     boards = {board: each for board, each in settings.boards.items() if board in used}
     single = settings.model_copy(update={"loops": {name: table}, "boards": boards})
     return started_as(single, {name: (Mode.MANUAL, table.setpoint_c)})

@@ -112,6 +112,13 @@ def _spike(tank: Tank, spike_k: float) -> str:
     return f"next sample {spike_k:+.3g} K off"
 
 
+def _drift(tank: Tank, rate_k_per_min: float) -> str:
+    """Let the second sensor drift, or the only one."""
+    which, probe = ("sensor", tank.probe) if tank.second is None else ("second sensor", tank.second)
+    probe.drift(rate_k_per_min / 60.0)
+    return f"the {which} drifts by {rate_k_per_min:+.3g} K a minute from now on"
+
+
 def _rewiring(wiring: Wiring) -> Callable[[Tank, float], str]:
     """Return a disturbance that leaves the sensor `wiring` for some seconds."""
 
@@ -152,6 +159,7 @@ DISTURBANCES: Mapping[str, Disturbance] = {
     "sag": Disturbance("mains sag for a minute", "fraction", 0.15, 0.0, 1.0, _sag),
     "draught": Disturbance("draught for five minutes", "times", 4.0, 0.0, 20.0, _draught),
     "spike": Disturbance("one bad sample", "K", 50.0, -300.0, 300.0, _spike),
+    "drift": Disturbance("the second sensor drifts", "K/min", 0.1, -10.0, 10.0, _drift),
     "dropout": Disturbance("no samples", "s", 15.0, 0.0, 1e6, _rewiring(Wiring.MISSING)),
     "open": Disturbance("broken wire", "s", 15.0, 0.0, 1e6, _rewiring(Wiring.OPEN)),
     "short": Disturbance("shorted wire", "s", 15.0, 0.0, 1e6, _rewiring(Wiring.SHORT)),

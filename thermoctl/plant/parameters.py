@@ -313,6 +313,8 @@ class TankParameters:
 
     Parameters
     ----------
+    second : Probe, optional
+        Another probe in the same water; the rig has none.
     initial_c : float
         Water, glass and heater at the start, 1 to 95 degC.
     pour_c : float
@@ -333,6 +335,7 @@ class TankParameters:
     cooler: Cooler = field(default_factory=Cooler)
     initial_c: float = 25.0
     pour_c: float = 10.0
+    second: Probe | None = None
 
     def __post_init__(self) -> None:
         require("initial_c", self.initial_c, 1.0, 95.0)

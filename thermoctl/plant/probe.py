@@ -51,6 +51,7 @@ class ProbeInTank:
         self._step_s = 0.0
         self._follow = 0.0
         self._spike_k = 0.0
+        self._drift_k, self._drift_k_per_s = 0.0, 0.0
         self._wiring = Wiring.SOUND
         self._wiring_until_s = 0.0
         self._away: float | None = None
@@ -70,6 +71,7 @@ class ProbeInTank:
         """Let `step_s` pass, at the end of which the water at the heater has `water_c`."""
         probe = self._parameters
         self._t_s += step_s
+        self._drift_k += step_s * self._drift_k_per_s
         self._past.append((self._t_s, water_c))
         delay_s = probe.transport_s * (1.0 if stirred else probe.still_transport_factor)
         met_c = self._arriving(self._t_s - delay_s) + self._turbulence.advance(step_s)
@@ -110,6 +112,10 @@ class ProbeInTank:
         """Add `spike_k` to the next voltage that is read, once."""
         self._spike_k = spike_k
 
+    def drift(self, rate_k_per_s: float) -> None:
+        """Let what is read move away from the sheath by `rate_k_per_s` from now on."""
+        self._drift_k_per_s = rate_k_per_s
+
     def rewire(self, wiring: Wiring, duration_s: float) -> None:
         """Connect the sensor as `wiring` says for `duration_s`."""
         self._wiring = wiring
@@ -129,5 +135,5 @@ class ProbeInTank:
             case Wiring.SHORT:
                 return 0.0
             case Wiring.SOUND:
-                sound_v = LM335.volts(self._sheath_c + spike_k)
+                sound_v = LM335.volts(self._sheath_c + spike_k + self._drift_k)
                 return sound_v * (1.0 + self._parameters.gain_error)

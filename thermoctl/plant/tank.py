@@ -22,7 +22,7 @@ from thermoctl.plant.probe import ProbeInTank
 
 
 class Tank:
-    """Two zones of water, glass, ice, a heater with its stage, a cooler, a probe.
+    """Two zones of water, glass, ice, a heater with its stage, a cooler, probes.
 
     Parameters
     ----------
@@ -41,6 +41,9 @@ class Tank:
         supply, rated_w = parameters.supply, parameters.element.rated_w
         self.parameters = parameters
         self.probe = ProbeInTank(parameters.probe, parameters.initial_c, probe_rng)
+        self.second: ProbeInTank | None = None
+        if parameters.second is not None:  # its generator comes last and changes no other
+            self.second = ProbeInTank(parameters.second, parameters.initial_c, *rng.spawn(1))
         self.stage = PowerStage(law or SquareLaw(), rated_w, supply, mains_rng)
         self._loss = Wander(Normals(loss_rng), supply.loss_spread, supply.loss_s)
         self._start = self._heat = thermal.start(parameters)
@@ -133,6 +136,8 @@ class Tank:
         )
         self._t_s += step_s
         self.probe.advance(step_s, self._water_c, stirred=self._stirred)
+        if self.second is not None:
+            self.second.advance(step_s, self._water_c, stirred=self._stirred)
 
     @property
     def _water_c(self) -> float:

@@ -81,7 +81,8 @@ def judge(
     temperature_c = measurement.temperature_c
     if not is_finite_number(temperature_c):
         return replace(memory, verdict=Verdict.MISSING)
-    over, under = temperature_c > limits.trip_above_c, temperature_c < limits.trip_below_c
+    over_c, under_c = farthest(measurement, limits)
+    over, under = over_c > limits.trip_above_c, under_c < limits.trip_below_c
     # Too hot is believed at once, from a stale reading as well: it only ever costs heat. So is too
     # cold where something cools.
     if over and limits.can_heat:
@@ -94,6 +95,17 @@ def judge(
     if judged.verdict is Verdict.GOOD and (over or under):
         return replace(judged, verdict=Verdict.OVER if over else Verdict.UNDER)
     return judged
+
+
+def farthest(measurement: Measurement, limits: Limits) -> tuple[float, float]:
+    """Return the readings, in degC, to hold against the upper and the lower trip.
+
+    Of two sensors the hotter where something heats, and the colder where something cools; else
+    what is controlled by, for the other one may drift where no actuator could bring the plant.
+    """
+    shown_c = measurement.temperature_c
+    cold_c, hot_c = measurement.ends_c or (shown_c, shown_c)
+    return hot_c if limits.can_heat else shown_c, cold_c if limits.can_cool else shown_c
 
 
 _CIRCUIT = {Quality.OPEN: Verdict.OPEN, Quality.SHORT: Verdict.SHORT}

@@ -34,6 +34,8 @@ class Plan:
         How the heater is checked against what it was seen to do; not at all when not given.
     setpoint_rate_k_per_s : float
         How fast a set point is approached, at most; infinite: at once.
+    disagreement_k : float
+        How far apart two sensors may be, where the loop has two.
 
     Raises
     ------
@@ -50,6 +52,7 @@ class Plan:
     shadow: Controller | None = None
     setpoint_rate_k_per_s: float = math.inf
     heater_check: HeaterCheck | None = None
+    disagreement_k: float = 1.0
 
     def __post_init__(self) -> None:
         if self.mode is Mode.PROGRAM:

@@ -19,6 +19,7 @@ from thermoctl.regulator.judge import Verdict
 from thermoctl.regulator.learning import Learning
 from thermoctl.regulator.load import KnownLoad
 from thermoctl.regulator.mind import Mind
+from thermoctl.regulator.pairing import Pairing
 from thermoctl.regulator.plan import Plan
 from thermoctl.regulator.recollection import NOTHING, origin, recall, remembering
 from thermoctl.regulator.shadow import Shadow
@@ -78,6 +79,9 @@ class Regulator:
         self._learning = Learning(plan.identifier, self._supervisor, self._guard)
         self._feasibility = Feasibility(plan.limits.period_s, self._supervisor.alarms, self._emit)
         self._load = KnownLoad(self._emit)
+        self._pairing = Pairing(
+            plan.limits, plan.disagreement_k, self._supervisor.alarms, self._emit
+        )
         self._watch: HeaterWatch | None = None
         if plan.heater_check is not None:
             period_s = plan.limits.period_s
@@ -162,6 +166,10 @@ class Regulator:
         self._supervisor.master_released = released
 
     # -- the walk of a sample --------------------------------------------------------------------
+
+    def fuse(self, first: Measurement, second: Measurement) -> Measurement:
+        """Return what two sensors of this plant show together, for `step` to take."""
+        return self._pairing.fuse(first, second)
 
     def step(self, measurement: Measurement) -> Step:
         """Return what is made of `measurement`; never raises, whatever it holds."""

@@ -29,7 +29,7 @@ from thermoctl.errors import Refused
 from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.changeover import Changeover
-from thermoctl.regulator.judge import Judged, Verdict, judge
+from thermoctl.regulator.judge import Judged, Verdict, farthest, judge
 from thermoctl.regulator.limits import Limits
 from thermoctl.signals import Alarm, Command, Measurement, State
 
@@ -62,6 +62,7 @@ class Supervisor:
         self._emit = emit
         self._judged = Judged()
         self._reading = math.nan
+        self._farthest = math.nan, math.nan  # what is held against the upper and the lower trip
         self._good_s = 0.0  # good readings without a break
         self._blind_s = 0.0  # time without a good reading that was not paid back yet
         self._seen_s = 0.0  # what the last reading answers for
@@ -98,6 +99,7 @@ class Supervisor:
         before = self._judged.verdict
         self._judged = judge(self._judged, measurement, self.limits, jump_k)
         self._reading = measurement.temperature_c
+        self._farthest = farthest(measurement, self.limits)
         self._seen_s = seen_s = self.limits.seen_s(interval_s)
         verdict = self._judged.verdict
         if verdict is Verdict.GOOD:
@@ -129,10 +131,10 @@ class Supervisor:
 
     def _trip(self, verdict: Verdict, t_s: float) -> None:
         code, fault = _TRIPS[verdict]
-        limits = self.limits
+        limits, got_c = self.limits, self._farthest[verdict is Verdict.UNDER]
         text = (
             f"expected {limits.trip_below_c:g} to {limits.trip_above_c:g} degC, "
-            f"got {self._reading:.2f} degC"
+            f"got {got_c:.2f} degC"
         )
         if self._tripping is verdict:
             self.latch(code, fault, text, t_s)

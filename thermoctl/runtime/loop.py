@@ -21,7 +21,7 @@ from thermoctl.regulator.limits import command_lasts_s
 from thermoctl.runtime.asked import Asked
 from thermoctl.runtime.cascade import Lead, hand_down, outer_first
 from thermoctl.runtime.connection import Connection
-from thermoctl.runtime.wiring import Output, Wiring, signed
+from thermoctl.runtime.wiring import Input, Output, Wiring, signed
 from thermoctl.signals import Cycle, Event, Measurement, Quality, RawSample, Request, Step
 
 EXCHANGE_S = 0.2
@@ -151,7 +151,7 @@ class Loop:
             self.report("cycle.late", late_s=late_s)
         self._grant_requests()
         samples = {id(board): self._read(board) for board in self.boards}
-        seen = {w.name: self._measure(w, samples[id(w.sensor_board)]) for w in self.wirings}
+        seen = {w.name: self._see(w, samples) for w in self.wirings}
         led = {w.name: self._led(w, w.lead, seen) for w in self.wirings if w.lead is not None}
         walked = []
         for wiring in self.wirings:
@@ -170,12 +170,12 @@ class Loop:
         except LinkError as error:
             if not board.awaited:
                 self._tell(board, "board.lost", 13, str(error))
-        except FaultError as error:
-            self._tell(board, "board.fault", 25, str(error))
         except DriverError as error:
-            if board.name not in self._silent:
+            if isinstance(error, FaultError) and self._users(board):
+                self._tell(board, "board.fault", 25, str(error))
+            elif board.name not in self._silent:
                 self.report("board.silent", board=board.name, error=str(error))
-            self._silent.add(board.name)
+                self._silent.add(board.name)
         except Exception as error:  # noqa: BLE001 - drivers come from entry points
             self._fail(self._users(board), "cycle.failed", error)
         else:
@@ -183,11 +183,18 @@ class Loop:
             return samples
         return {}
 
-    def _measure(self, wiring: Wiring, samples: Mapping[str, RawSample]) -> Measurement:
-        """Return what the input says; a sample that is not of these seconds is STALE."""
+    def _see(self, wiring: Wiring, samples: Mapping[int, Mapping[str, RawSample]]) -> Measurement:
+        """Return what the sensor of a loop says, or its two sensors together."""
+        first, *second = (self._measure(wiring, i, samples[id(i.board)]) for i in wiring.inputs)
+        return wiring.regulator.fuse(first, second[0]) if second else first
+
+    def _measure(
+        self, wiring: Wiring, read: Input, samples: Mapping[str, RawSample]
+    ) -> Measurement:
+        """Return what an input says; a sample that is not of these seconds is STALE."""
         now_s = self._clock.now_s()
         try:
-            measurement = wiring.sensor.measure(samples.get(wiring.input), now_s)
+            measurement = read.sensor.measure(samples.get(read.channel), now_s)
             if -EXCHANGE_S <= now_s - measurement.t_s <= max(FRESH_S, 1.5 * self._period_s):
                 return measurement
         except Exception as error:  # noqa: BLE001 - of a sample that a plug-in made
@@ -268,8 +275,8 @@ class Loop:
     # -- when something fails --------------------------------------------------------------------
 
     def _users(self, board: Connection) -> tuple[Wiring, ...]:
-        """Return the loops that depend on `board`."""
-        return tuple(w for w in self.wirings if board in w.boards)
+        """Return the loops that cannot do without `board`."""
+        return tuple(w for w in self.wirings if board in w.needs)
 
     def _tell(self, board: Connection, code: str, fault: int, text: str) -> None:
         """Send every loop that depends on `board` to SAFE."""

@@ -29,6 +29,15 @@ class Output:
 
 
 @dataclass(frozen=True, slots=True)
+class Input:
+    """A channel of a board, and the sensor that hangs on it."""
+
+    board: Connection
+    channel: str
+    sensor: Sensor
+
+
+@dataclass(frozen=True, slots=True)
 class Wiring:
     """One loop and what it is connected to.
 
@@ -47,6 +56,8 @@ class Wiring:
         Where negative power goes to.
     lead : Lead, optional
         What its power means to another loop, in place of an output.
+    second : Input, optional
+        Where another sensor of the same plant is.
     """
 
     name: str
@@ -59,6 +70,9 @@ class Wiring:
     law: ActuatorLaw
     cooler: Output | None = None
     lead: Lead | None = None
+    second: Input | None = None
+    inputs: tuple[Input, ...] = field(init=False, repr=False)
+    """The sensor, and the second one where there is one."""
     outputs: tuple[Output, ...] = field(init=False, repr=False)
     """The heater, and the cooler where there is one."""
 
@@ -66,12 +80,22 @@ class Wiring:
         board = self.actuator_board
         heater = None if board is None else Output(board, self.output, self.law)
         outputs = tuple(each for each in (heater, self.cooler) if each is not None)
+        first = Input(self.sensor_board, self.input, self.sensor)
+        inputs = (first,) if self.second is None else (first, self.second)
         object.__setattr__(self, "outputs", outputs)
+        object.__setattr__(self, "inputs", inputs)
 
     @property
     def boards(self) -> tuple[Connection, ...]:
-        """Every board it depends on."""
-        return (self.sensor_board, *(each.board for each in self.outputs))
+        """Every board it uses."""
+        return (*(i.board for i in self.inputs), *(o.board for o in self.outputs))
+
+    @property
+    def needs(self) -> tuple[Connection, ...]:
+        """The boards it cannot do without: of two that read, it can spare either."""
+        read = {id(i.board): i.board for i in self.inputs}
+        only = tuple(read.values()) if len(read) == 1 else ()
+        return (*only, *(o.board for o in self.outputs))
 
     def on(self, board: Connection) -> list[Output]:
         """Return its outputs on `board`."""
