@@ -13,9 +13,9 @@ pytestmark = pytest.mark.e2e
 SIM = [sys.executable, "-m", "thermoctl", "--sim", "--no-history"]
 KEYS = {
     "t_s", "loop", "mode", "state", "temperature_c", "quality", "setpoint_c", "power",
-    "reference_c", "load", "accepted_power", "controller", "innovation_k", "inflation", "gain", "gain_sd", "a", "a_sd",
-    "holding_power", "lag_s", "shadow", "shadow_power", "shadow_score", "feasible", "tick_us",
-    "late_s", "alarms", "model_origin", "true_temperature_c",
+    "reference_c", "load", "accepted_power", "controller", "innovation_k", "inflation", "gain",
+    "gain_sd", "a", "a_sd", "holding_power", "lag_s", "shadow", "shadow_power", "shadow_score",
+    "feasible", "tick_us", "late_s", "alarms", "model_origin", "true_temperature_c",
 }  # fmt: skip
 SUMMARY = {
     "duration_s", "steps", "missed", "overshoot_k", "settled_s", "deviation_mk",

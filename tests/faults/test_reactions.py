@@ -30,7 +30,7 @@ from thermoctl.plant.parameters import TankParameters
 from thermoctl.regulator import Regulator
 from thermoctl.runtime.connection import Connection
 from thermoctl.runtime.loop import EXCHANGE_S, Loop, Wiring
-from thermoctl.signals import Beliefs, Cycle, Estimate, Mode, Quality, RawSample, SetPoint, State
+from thermoctl.signals import Beliefs, Cycle, Estimate, Quality, RawSample, SetPoint, State
 from thermoctl.testing import FaultyLink, LockStepLink, ManualClock, ScriptedBoard
 from thermoctl_drivers import thermodaq_frames as frames
 from thermoctl_drivers.thermodaq import ThermoDaq, ThermoDaqSettings
@@ -536,10 +536,11 @@ def test_a_bad_set_point_put_into_the_queue_is_refused_and_the_old_one_stays(val
 def test_no_key_of_the_live_view_asks_for_a_set_point_out_of_range(setpoint_c: float) -> None:
     desk = Desk(Facts("tank", 1.0, 5.0, 55.0, datetime.now(UTC)))
     tank = Tank(settled_s=2)
-    steps = [each for each in Action if each.name.startswith("SETPOINT")]
-    assert len(steps) == 4
-    for action in steps * 20:
-        request = desk.press(action, Mode.AUTO, setpoint_c)
+    step = replace(tank.last.step, setpoint_c=setpoint_c)
+    keys = [each for each in Action if each.name.startswith("SETPOINT")]
+    assert len(keys) == 4
+    for action in keys * 20:
+        request = desk.press(action, step)
         if request is None:  # at the limit there is nothing left to ask for
             continue
         assert isinstance(request, SetPoint)
