@@ -16,6 +16,7 @@ from thermoctl.testing import ManualClock, ScriptedBoard
 
 TABLE = {"setpoint_c": 37.5, "trip_above_c": 60.0, "mode": "auto", "controller": "on-off"}
 COLD = 600.0  # counts of 1024 at 5 V: 19.8 degC
+COUNTS_PER_K = 0.010 / 5.0 * 1024.0
 
 
 class House:
@@ -192,7 +193,9 @@ def test_the_end_is_confirmed_where_nothing_was_ever_switched_on():
 
 def test_readers_that_fail_steer_nothing_and_are_told_of_when_somebody_listens_again():
     clock = ManualClock()
-    house = House(clock, ScriptedBoard(clock, [COLD]), ScriptedBoard(clock, [COLD]))
+    # Water that warms by 20 mK/s: a heater that does nothing for so long would be switched off.
+    warming = [COLD + 0.02 * COUNTS_PER_K * second for second in range(101)]
+    house = House(clock, ScriptedBoard(clock, warming), ScriptedBoard(clock, warming))
 
     def fail(*ignored):
         raise OSError("disk full")
