@@ -5,60 +5,31 @@ A child process is killed at every single call into C that a write makes, one af
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-
 import pytest
 
-KILL_AT_EVERY_CALL = """
-import json, os, signal, sys
-from pathlib import Path
+STORED = """
 from thermoctl.services.store import Latch, LatchStore
 
-store = LatchStore(Path(sys.argv[1]))
+store = LatchStore(folder)
 OLD, NEW = Latch("sensor.open", "old", 1, 1.0), Latch("trip.over_temperature", "new", 9, 2.0)
 
-def act():
-    store.save("tank", NEW) if sys.argv[2] == "save" else store.clear("tank")
-
-def run_until(fatal):
-    calls = []
-    def watch(frame, event, called):
-        if event == "c_call":
-            calls.append(called.__name__)
-            if len(calls) == fatal:
-                os.kill(os.getpid(), signal.SIGKILL)
-    sys.setprofile(watch)
-    act()
-    sys.setprofile(None)
-    return calls
-
-store.save("tank", OLD)
-calls, outcomes = run_until(0), []
-for fatal in range(1, len(calls) + 1):
+def before():
     store.save("tank", OLD)
-    child = os.fork()
-    if child == 0:
-        run_until(fatal)
-        os._exit(0)
-    status = os.waitpid(child, 0)[1]
-    assert os.WIFSIGNALED(status), fatal
+
+def found():
     latch = store.load("tank")
-    outcomes.append(None if latch is None else latch.text)
-store.save("tank", NEW)
-print(json.dumps({"calls": calls, "outcomes": outcomes, "files": os.listdir(sys.argv[1])}))
+    return None if latch is None else latch.text
+
+def act():
 """
+ACTS = {"save": '    store.save("tank", NEW)', "clear": '    store.clear("tank")'}
 
 
-@pytest.fixture(scope="module", params=["save", "clear"])
-def killed(request, tmp_path_factory):
+@pytest.fixture(scope="module", params=list(ACTS))
+def killed(request, tmp_path_factory, kill_at_every_call):
     """Return the calls of a save or a clear, and what was found after a kill at each of them."""
     folder = tmp_path_factory.mktemp("state")
-    command = [sys.executable, "-c", KILL_AT_EVERY_CALL, str(folder), request.param]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return request.param, json.loads(done.stdout)
+    return request.param, kill_at_every_call(folder, STORED + ACTS[request.param])
 
 
 def test_a_kill_at_any_call_leaves_the_old_record_or_the_new_one(killed):
