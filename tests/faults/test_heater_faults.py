@@ -159,8 +159,8 @@ def test_a_power_set_by_hand_is_checked_as_well() -> None:
 def test_the_message_holds_both_numbers_and_a_mended_heater_goes_on() -> None:
     rig = Rig()
     rig.run(900)
-    rig.befall("element-dead", 500.0)
-    rig.until_latched(480)
+    rig.befall("element-dead", 700.0)
+    rig.until_latched(680)
     text = rig.told("heater.no_response")[0]
     print(text)
     assert "expected +" in text

@@ -14,6 +14,8 @@ _MOST = 9.0  # a square counts as three standard deviations at most
 _MEMORY = 0.01  # of 100 readings
 _SPREAD = 6.0  # variance of y - 2 y1 + y2 in units of the noise's: 1 + 4 + 1
 _SURE = 30.0  # exponent of the odds against a run of equal readings
+_ROUNDED = 1.0 / math.sqrt(12.0)  # standard deviation of what a step rounds off, in steps
+_STEP_MAX_K = 0.5  # no converter is taken to be coarser
 
 
 class Blocks:
@@ -31,6 +33,7 @@ class Blocks:
         self._least_s = max(BLOCK_S, period_s) - 0.5 * period_s
         self._sign = sign
         self._variance = NOISE_START_K2
+        self._step_k = _STEP_MAX_K
         self._last_c = self._before_c = math.nan
         self.clear()
 
@@ -46,6 +49,9 @@ class Blocks:
         if reading_c == reading_c:  # nearly always, and faster than to ask for NaN
             self._total_c += reading_c
             self._readings += 1
+            moved_k = abs(reading_c - self._last_c)
+            if 0.0 < moved_k < self._step_k:
+                self._step_k = moved_k
             second = reading_c - 2.0 * self._last_c + self._before_c
             self._before_c, self._last_c = self._last_c, reading_c
             if second == second:
@@ -58,29 +64,32 @@ class Blocks:
         n, span_s, given_s = self._readings, self._span_s, self._given_s
         mean_c = self._sign * self._total_c / n if n else math.nan
         self.clear()
-        return Block(span_s, given_s / span_s, mean_c, math.sqrt(self._variance / max(n, 1)))
+        # What is rounded off stays the same for many readings: their mean is no better.
+        sd_k = math.hypot(math.sqrt(self._variance / max(n, 1)), _ROUNDED * self._step_k)
+        return Block(span_s, given_s / span_s, mean_c, sd_k)
 
 
 class Repeats:
     """Tells a converter that stands still from one with coarse steps.
 
-    The share of readings that equal the one before is learnt; a run that is next to impossible by
-    that share, and no shorter than `LEAST`, is a converter that stands still.
+    Noise beyond a step makes readings turn back all the time, up and down; a drift through the
+    steps of a quiet converter does not. Where many turn back, a run of equal readings is judged by
+    the share of those that equal the one before: next to impossible is a converter that stands.
     """
 
     LEAST = 10
     KNOWN_AFTER = 200
     MEMORY = 1 / 500
-    SHARE_MAX = 0.4
-    """Where more readings than this repeat themselves, the noise is below half a step."""
+    TURNS_MIN = 0.4
+    """In pure noise two thirds turn back; with fewer than this it is below a step."""
     MORE, AND = 1.3, 0.02
-    """Where the reading lies between two steps changes the share by about so much."""
+    """Where the reading lies between two steps changes the share of equal ones by about so much."""
 
     def __init__(self) -> None:
         self._last_c = math.nan
-        self._run = 0
-        self._seen = 0
-        self._share = 0.0
+        self._moved_k = 0.0
+        self._run = self._seen = 0
+        self._equal = self._turns = 0.0
         self._limit = math.inf
 
     def observe(self, reading_c: float) -> bool:
@@ -89,9 +98,10 @@ class Repeats:
             self._run += 1
             return self._run >= self._limit
         if reading_c == reading_c:
-            self._last_c = reading_c
-            self._learn(self._run)
-            self._run = 0
+            moved_k = reading_c - self._last_c
+            if self._run < self._limit:  # one that was a fault teaches nothing
+                self._learn(moved_k * self._moved_k < 0.0)
+            self._moved_k, self._last_c, self._run = moved_k, reading_c, 0
         return False
 
     @property
@@ -99,13 +109,13 @@ class Repeats:
         """How many readings in a row have equalled the one before."""
         return self._run
 
-    def _learn(self, run: int) -> None:
-        """Learn from a run that has ended; one that was a fault teaches nothing."""
-        if run >= self._limit:
-            return
-        self._seen += run + 1
-        memory = max(self.MEMORY, 1.0 / self._seen)
-        self._share += min(memory * (run + 1), 1.0) * (run / (run + 1) - self._share)
-        known = self._seen >= self.KNOWN_AFTER and self._share <= self.SHARE_MAX
-        odds = -math.log(self.MORE * self._share + self.AND)
+    def _learn(self, turned: bool) -> None:
+        """Learn from a reading that moved, and from the equal ones before it."""
+        count = self._run + 1
+        self._seen += count
+        share = min(max(self.MEMORY, 1.0 / self._seen) * count, 1.0)
+        self._equal += share * (self._run / count - self._equal)
+        self._turns += share * (turned / count - self._turns)
+        known = self._seen >= self.KNOWN_AFTER and self._turns >= self.TURNS_MIN
+        odds = -math.log(min(self.MORE * self._equal + self.AND, 0.99))
         self._limit = max(self.LEAST, math.ceil(_SURE / odds)) if known else math.inf

@@ -36,12 +36,17 @@ MEMORY_S, MEMORY_LAGS = 300.0, 10.0
 CREPT, CREPT_S = 0.12, 100.0
 """A loss that has grown by so much of full power, for so long, while the reading has stood still: a
 sensor that shows the same for ever makes a controller add power little by little."""
+CREPT_K = 0.3
+"""That much it would have moved the reading meanwhile; less, nobody could see."""
 STANDS_K = 0.3
 """A reading this close to where it was has stood still."""
 COMPARED_FROM_S, COMPARED_S = 600.0, 21600.0
 """The loss it had is learnt for the first time, and forgotten over the second."""
 SETTLE_S = 300.0
 """After a jump it is not known what the plant does without power."""
+COOLS_WITHIN_S = 1000.0
+"""Loss grows by a K in so many seconds for every K above where it was learnt: half a litre in a
+draught. What is hotter than ever before may take that much more power before it is a doubt."""
 
 
 class Seen(NamedTuple):
@@ -65,6 +70,7 @@ class HeatDoubt:
         self._rates: Heat = (0.0,) * len(LAGS_S)
         self._rise_rate = 0.0
         self._known_s = 0.0
+        self._level_c = math.nan
         self._stood_c = math.nan
         self._stood_s = self._stood_loss = 0.0
         self._settle_s = 0.0
@@ -104,6 +110,7 @@ class HeatDoubt:
         heat_s = [after - was for after, was in zip(now.heat_s, before.heat_s, strict=True)]
         heat_k, full_k = gain.mean * heat_s[gain.place], gain.mean * span_s
         loss_k = self.loss(gain) * span_s
+        loss_k += self._unseen(now.reading_c) * span_s
         missing_k = clamp(heat_k - loss_k - rise_k, -2.0 * full_k, heat_k)
         missing_k += self._missing_k - HALF * heat_k - FULL_SHARE * full_k
         if self._missing_k == 0.0:
@@ -111,21 +118,31 @@ class HeatDoubt:
         self._missing_k = max(0.0, missing_k)
         self._settle_s = SETTLE_S if jumped else self._settle_s - span_s
         if self._settle_s <= 0.0:
-            extra_k = rise_k + min(loss_k, 0.0) - EXTRA_GAINS * heat_k
+            extra_k = rise_k + min(self.loss(gain) * span_s, 0.0) - EXTRA_GAINS * heat_k
             extra_k = clamp(extra_k, -full_k, full_k) - EXTRA_SHARE * full_k
             self._extra_k = max(0.0, self._extra_k + extra_k)
         if follow and not jumped and self.calm(gain, block.sd_k):
             rise_k = clamp(rise_k, -full_k, full_k)
-            self._follow(gain, heat_s, rise_k, span_s)
+            self._follow(gain, heat_s, rise_k, span_s, now.reading_c)
         self._creep(gain, now.reading_c, block)
 
-    def _follow(self, gain: Gain, heat_s: Sequence[float], rise_k: float, span_s: float) -> None:
+    def _unseen(self, reading_c: float) -> float:
+        """Return by how much the loss may have grown since it was learnt, in K/s."""
+        above_k = reading_c - self._level_c
+        return above_k / COOLS_WITHIN_S if above_k > 0.0 else 0.0
+
+    def _follow(
+        self, gain: Gain, heat_s: Sequence[float], rise_k: float, span_s: float, reading_c: float
+    ) -> None:
         """Let the quiet rates follow those of a block."""
         self._known_s += span_s
         share = span_s / min(self._known_s, max(MEMORY_S, MEMORY_LAGS * gain.lag_s))
         pairs = zip(self._rates, heat_s, strict=True)
         self._rates = tuple([rate + share * (heat / span_s - rate) for rate, heat in pairs])
         self._rise_rate += share * (rise_k / span_s - self._rise_rate)
+        if math.isnan(self._level_c):
+            self._level_c = reading_c
+        self._level_c += share * (reading_c - self._level_c)
 
     def _creep(self, gain: Gain, reading_c: float, block: Block) -> None:
         """Notice a loss that grows while the reading stands still."""
@@ -136,7 +153,8 @@ class HeatDoubt:
         memory_s = COMPARED_S if self._stood_s > COMPARED_FROM_S else MEMORY_S
         self._stood_loss += min(span_s / memory_s, 1.0) * (loss - self._stood_loss)
         grown = loss - self._stood_loss
-        seen = self._stood_s > COMPARED_FROM_S and grown * MEMORY_S > SDS * block.sd_k
+        least_k = max(CREPT_K, SDS * block.sd_k)
+        seen = self._stood_s > COMPARED_FROM_S and grown * MEMORY_S > least_k
         crept = seen and grown > CREPT * gain.mean
         self._crept_s = self._crept_s + span_s if crept else 0.0
 

@@ -324,7 +324,15 @@ class HeaterWatch:
         self._go_on()
 
     def _refuse(self, answer: Answer, cut: _Cut, shown: Gain, asked_s: float, t_s: float) -> None:
-        """Fail a heater that answered with nothing, or the wrong way."""
+        """Fail a heater that answered with nothing, or the wrong way.
+
+        One that is not known is asked a second time before anybody is told: while a plant that was
+        never seen comes to rest, anything may move its reading for a minute.
+        """
+        if self._known is None and self._t_s - self._failed_s >= LATELY_S:
+            self._failed_s, self._patience_s = self._t_s, self._check.first_heat_s
+            self._go_on()
+            return
         code = "heater.reversed" if answer is Answer.COOLS else "heater.no_response"
         known = "" if self._known is None else f" instead of {self._known.mean:.3g}"
         text = (
