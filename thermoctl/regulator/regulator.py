@@ -190,7 +190,8 @@ class Regulator:
         self._jump_k = self._jump_for(beliefs)
         if self._feasibility.observe(interval_s, applied, temperature_c, beliefs.lag_s):
             self._feasibility.reckon(self._wanted(), t_s)
-        state = self._supervisor.rule(t_s, self._ride_s(situation, beliefs))
+        ride_s = self._ride_s(situation, beliefs) if verdict is Verdict.MISSING else 0.0
+        state = self._supervisor.rule(t_s, ride_s)
         asked, reason = self._ask(situation, state, beliefs)
         self._steering.tell_remarks(t_s)
         self._command = self._supervisor.bound(asked, reason, t_s)
