@@ -177,7 +177,10 @@ class Loop:
                 self.report("board.silent", board=board.name, error=str(error))
                 self._silent.add(board.name)
         except Exception as error:  # noqa: BLE001 - drivers come from entry points
-            self._fail(self._users(board), "cycle.failed", error)
+            users = self._users(board)
+            if users or board.name not in self._silent:  # a board that can be spared: once
+                self._fail(users, "cycle.failed", error)
+            self._silent.add(board.name)
         else:
             self._silent.discard(board.name)
             return samples
