@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import sys
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, get_origin, get_type_hints
 
@@ -39,7 +41,13 @@ class BadOption(ConfigError):  # noqa: N818 - as its siblings in errors
 
 def kinds(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of `group` by kind, in alphabetical order."""
-    return {each.name: each for each in sorted(entry_points(group=group), key=lambda e: e.name)}
+    return {each.name: each for each in _declared(group, tuple(sys.path))}
+
+
+@lru_cache
+def _declared(group: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """Return what the packages on `path` declare, by name; it reads the metadata of every one."""
+    return tuple(sorted(entry_points(group=group), key=lambda each: each.name))
 
 
 def find(group: str, kind: str) -> Any:
