@@ -171,6 +171,7 @@ class Situation:
     target_c: float = math.nan
 
 
+@runtime_checkable
 class Controller(Protocol):
     """A law of control: frozen; what it remembers goes in and comes out.
 

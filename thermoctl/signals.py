@@ -2,8 +2,8 @@
 
     RawSample -> Measurement -> Estimate -> Command -> Step -> Cycle
 
-Requests travel the other way, through one queue that is read at the top of a cycle: `SetPoint`,
-`ManualPower`, `Mode`, `Load`, `ChooseController`, `Acknowledge`.
+Requests travel the other way, through one queue that is read at the top of a cycle. They stand in
+`thermoctl.requests`, and can be had from here as well.
 """
 
 from __future__ import annotations
@@ -15,6 +15,14 @@ from enum import StrEnum
 from typing import Any
 
 from thermoctl.quantities import Array
+from thermoctl.requests import Acknowledge as Acknowledge
+from thermoctl.requests import ChooseController as ChooseController
+from thermoctl.requests import ChooseShadow as ChooseShadow
+from thermoctl.requests import Load as Load
+from thermoctl.requests import ManualPower as ManualPower
+from thermoctl.requests import Mode as Mode
+from thermoctl.requests import Request as Request
+from thermoctl.requests import SetPoint as SetPoint
 
 
 class Quality(StrEnum):
@@ -25,15 +33,6 @@ class Quality(StrEnum):
     OPEN = "open"
     SHORT = "short"
     STALE = "stale"
-
-
-class Mode(StrEnum):
-    """What the operator wants."""
-
-    OFF = "off"
-    MANUAL = "manual"
-    AUTO = "auto"
-    PROGRAM = "program"
 
 
 class State(StrEnum):
@@ -76,49 +75,6 @@ class Measurement:
     temperature_c: float = math.nan
     quality: Quality = Quality.GOOD
     ends_c: tuple[float, float] | None = None  # of two sensors the lower and the higher reading
-
-
-@dataclass(frozen=True, slots=True)
-class SetPoint:
-    """Request: hold `value_c`, at most at `rate_k_per_min`; None: as configured."""
-
-    value_c: float
-    rate_k_per_min: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ManualPower:
-    """Request: give `power` in mode MANUAL: in [0, 1], with a cooler in [-1, 1]."""
-
-    power: float
-
-
-@dataclass(frozen=True, slots=True)
-class Load:
-    """Request: expect the plant to lose `power` more, for `duration_s` from now on.
-
-    A fraction of full power in [-1, 1], instead of a load that was announced before; 0 ends it.
-    """
-
-    power: float
-    duration_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Acknowledge:
-    """Request: acknowledge `code`, or all; clears a latch without a cause."""
-
-    code: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ChooseController:
-    """Request: put the controller called `name` in charge, its rival in the shadow."""
-
-    name: str
-
-
-Request = Mode | SetPoint | ManualPower | Load | ChooseController | Acknowledge
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,7 +15,9 @@ from typing import Any, Final, Protocol
 from thermoctl import __version__
 from thermoctl.app.cycle_record import cycle_record, iso_time
 from thermoctl.app.cycle_wire import details_of
+from thermoctl.errors import ConfigError
 from thermoctl.insight import Insight
+from thermoctl.ports import Controller
 from thermoctl.runtime.asked import Asked
 from thermoctl.services.control_protocol import Call, CallError
 from thermoctl.services.control_socket import Pending
@@ -24,6 +26,7 @@ from thermoctl.signals import (
     Acknowledge,
     Alarm,
     ChooseController,
+    ChooseShadow,
     Cycle,
     Load,
     ManualPower,
@@ -35,6 +38,11 @@ from thermoctl.signals import (
 _PERIODS: Final = 2.0
 _SPARE_S: Final = 2.0
 _MODES: Final = (Mode.OFF, Mode.MANUAL, Mode.AUTO)
+
+
+def _no_law(loop: str, kind: str) -> Controller:
+    """Refuse: nobody here knows how laws are built."""
+    raise ConfigError(f"expected a daemon that can build laws, got {kind!r} for {loop!r}")
 
 
 class Asks(Protocol):
@@ -65,6 +73,8 @@ class Clerk:
         Seconds since 1970 UTC.
     insight : callable
         What is told of a loop by name, None where nothing is.
+    law : callable
+        Returns the law of a kind for a loop, both by name; raises `ConfigError` where none fits.
     """
 
     def __init__(
@@ -78,10 +88,12 @@ class Clerk:
         wall_clock: Callable[[], float] = time.time,
         *,
         insight: Callable[[str], Insight | None] = lambda loop: None,
+        law: Callable[[str, str], Controller] = _no_law,
     ) -> None:
         self._loop, self._seen, self._periods_s = loop, seen, dict(periods_s)
         self._latches, self._state = latches, state
-        self._now_s, self._wall_clock, self._insight = now_s, wall_clock, insight
+        self._now_s, self._wall_clock = now_s, wall_clock
+        self._insight, self._law = insight, law
         self.patience_s = _PERIODS * max(self._periods_s.values()) + _SPARE_S
 
     def answer(self, call: Call) -> Mapping[str, Any] | Pending:
@@ -222,8 +234,19 @@ class Clerk:
                 return Mode(word), {"mode": word}
             case "controller", str(word), None:
                 return ChooseController(word), {"controller": word}
+            case "shadow", "none", None:
+                return ChooseShadow(None), {"shadow": None}
+            case "shadow", str(word), None:
+                return ChooseShadow(self._cast(name, word)), {"shadow": word}
             case _:
                 raise CallError("unknown_call", "a call that this daemon knows", call.do)
+
+    def _cast(self, loop: str, kind: str) -> Controller:
+        """Return the law that a loop would have in its shadow."""
+        try:
+            return self._law(loop, kind)
+        except ConfigError as error:
+            raise CallError("bad_value", text=str(error)) from error
 
     def _require_manual(self, name: str) -> None:
         """Refuse a power that would be kept, and then forgotten when mode manual begins."""

@@ -30,6 +30,7 @@ _COMMANDS: Final = {
     "output": "thermoctl.app.control_commands:output",
     "load": "thermoctl.app.control_commands:load",
     "controller": "thermoctl.app.control_commands:controller",
+    "shadow": "thermoctl.app.control_commands:shadow",
     "watch": "thermoctl.app.control_commands:watch",
     "alarms": "thermoctl.app.alarm_commands:alarms",
     "history": "thermoctl.app.service_commands:history",

@@ -203,6 +203,17 @@ def controller(name: str, loop: str | None, socket: Path | None, as_json: bool) 
     _tell(told, as_json, lambda: f"controller {told['controller']}")
 
 
+@click.command(epilog=examples("thermoctl shadow pid", "thermoctl shadow none"))
+@click.argument("name")
+@loop_option
+@socket_option
+@json_option
+def shadow(name: str, loop: str | None, socket: Path | None, as_json: bool) -> None:
+    """Let another law learn in the shadow, from now on; or none."""
+    told = _asked(socket, "shadow", loop=loop, name=name)
+    _tell(told, as_json, lambda: f"shadow {told['shadow'] or 'none'}")
+
+
 @click.command(
     epilog=examples("thermoctl watch", "thermoctl watch --lines", "thermoctl watch --json")
 )

@@ -21,6 +21,7 @@ from thermoctl import __version__
 from thermoctl.app.clerk import Clerk
 from thermoctl.app.compose import loop_for
 from thermoctl.app.insight_watch import InsightService, insights_for
+from thermoctl.app.parts import law_of_kind
 from thermoctl.app.resuming import Resumption, kept_latches
 from thermoctl.app.settings import Settings, default_files, load_all
 from thermoctl.errors import ConfigError
@@ -137,6 +138,7 @@ class Daemon:
             state,
             self._clock.now_s,
             insight=self._insight.insight,
+            law=lambda name, kind: law_of_kind(self._settings.loops[name], kind),
         )
         return ControlSocket(place, clerk, self._emit)
 

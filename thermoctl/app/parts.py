@@ -75,6 +75,25 @@ def plan_for(table: LoopTable) -> Plan:
         )
 
 
+def law_of_kind(table: LoopTable, kind: str) -> Controller:
+    """Return the law `kind` as a loop configures it, else as it is by default.
+
+    Raises
+    ------
+    BadOption
+        There is no such kind, or it does not fit the loop.
+    """
+    structure = _structure(table.model, table.period_s)
+    charge = _controller(table, table.controller, structure)
+    configured = [each for each in (table.controller, table.shadow) if each is not None]
+    chosen = next((each for each in configured if each.kind == kind), Options(kind=kind))
+    if "action" in plugins.option_names(plugins.find(plugins.CONTROLLERS, kind)):
+        chosen = Options.model_validate({"action": action_of(charge), **chosen.model_dump()})
+    law = _controller(table, chosen, structure)
+    _check_action(table, "shadow", law, charge)
+    return law
+
+
 def check_parts(table: LoopTable) -> None:
     """Build every part of a loop once; raise `BadOption` where that fails."""
     plan_for(table)

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 
 from thermoctl.errors import Refused
-from thermoctl.ports import Remembered, Situation
+from thermoctl.ports import Controller, Remembered, Situation
 from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.feasible import Feasibility, Wanted
 from thermoctl.regulator.guard import Guard
@@ -31,6 +31,7 @@ from thermoctl.signals import (
     Alarm,
     Beliefs,
     ChooseController,
+    ChooseShadow,
     Command,
     Event,
     Load,
@@ -127,12 +128,14 @@ class Regulator:
                 self._load.want(power, duration_s, self._t_s or 0.0)
             case ChooseController(name):
                 self._choose(name)
+            case ChooseShadow(law):
+                self._cast(law)
             case Acknowledge(code):
                 self._supervisor.acknowledge(code)
             case _:
                 raise Refused(
-                    "expected a Mode, SetPoint, ManualPower, Load, ChooseController or "
-                    f"Acknowledge, got {request!r}"
+                    "expected a Mode, SetPoint, ManualPower, Load, ChooseController, ChooseShadow "
+                    f"or Acknowledge, got {request!r}"
                 )
 
     def _choose(self, name: object) -> None:
@@ -164,6 +167,19 @@ class Regulator:
         """
         self._wishes.follow(setpoint_c)
         self._supervisor.master_released = released
+
+    def _cast(self, law: object) -> None:
+        """Put `law` in the shadow, where it learns; None ends the shadow."""
+        charge, before = self._steering.name, self._shadow.name
+        if law is not None and not isinstance(law, Controller):
+            raise Refused(f"expected a controller for the shadow, got {law!r}")
+        name = None if law is None else law.name
+        if name == charge:
+            raise Refused(f"expected another kind than {charge!r}, which is in charge")
+        if name == before:
+            return
+        self._shadow.replace(law)
+        self._emit("shadow.changed", before=before, after=name)
 
     # -- the walk of a sample --------------------------------------------------------------------
 

@@ -65,6 +65,11 @@ class Shadow:
         self._power, self._tally = None, Tally()
         return mind
 
+    def replace(self, controller: Controller | None) -> None:
+        """Put another law into the shadow, with nothing learnt yet; None: nobody."""
+        self._mind = None if controller is None else Mind(controller)
+        self._power, self._tally = None, Tally()
+
     def observe(self, situation: Situation, charge: Mind) -> None:
         """Show it the sample, before `charge` sees it; note how surprised both are."""
         mind = self._mind

@@ -48,6 +48,7 @@ _ARGUMENTS: Final[Mapping[str, tuple[_Argument, ...]]] = {
     "output": (_Argument("power", number=True),),
     "load": (_Argument("power", number=True), _Argument("duration_s", number=True)),
     "controller": (_Argument("name"),),
+    "shadow": (_Argument("name"),),
     "alarms": (),
     "ack": (_Argument("code", optional=True),),
     "watch": (_Argument("details", flag=True, optional=True),),

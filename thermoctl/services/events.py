@@ -101,6 +101,7 @@ _BY_LEVEL: Final = {
         "plant.changed",
         "request.refused",
         "setpoint.changed",
+        "shadow.changed",
         "sim.disturbed",
         "socket.opened",
         "state.changed",

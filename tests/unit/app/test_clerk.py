@@ -6,6 +6,7 @@ import pytest
 
 from thermoctl.app.clerk import Clerk
 from thermoctl.app.compose import loop_for
+from thermoctl.app.parts import law_of_kind
 from thermoctl.app.settings import load
 from thermoctl.services.control_protocol import Call, CallError
 from thermoctl.services.plain import as_json
@@ -47,7 +48,14 @@ class Desk:
         )
         periods_s = {name: table.period_s for name, table in self.settings.loops.items()}
         self.clerk = Clerk(
-            self.loop, self.seen, periods_s, self.latches, folder, self.clock.now_s, lambda: 1.7e9
+            self.loop,
+            self.seen,
+            periods_s,
+            self.latches,
+            folder,
+            self.clock.now_s,
+            lambda: 1.7e9,
+            law=lambda name, kind: law_of_kind(self.settings.loops[name], kind),
         )
 
     def _publish(self, cycle):
@@ -78,6 +86,21 @@ def code_of(ask):
     with pytest.raises(CallError) as refused:
         ask()
     return refused.value.code
+
+
+def test_any_kind_of_law_learns_in_the_shadow_and_then_takes_charge(desk):
+    assert desk.granted("shadow", "pid") == {"loop": "tank", "shadow": "pid"}
+    assert desk.ask("get", "shadow")["value"] == "pid"
+    assert desk.granted("controller", "pid")["controller"] == "pid"
+    assert desk.granted("shadow", "none") == {"loop": "tank", "shadow": None}
+    assert desk.ask("get", "shadow")["value"] is None
+
+
+def test_a_law_that_there_is_not_or_that_is_in_charge_stays_out_of_the_shadow(desk):
+    with pytest.raises(CallError, match="called 'magic'; known: adaptive, manual"):
+        desk.ask("shadow", "magic")
+    assert code_of(lambda: desk.granted("shadow", "on-off")) == "refused"
+    assert desk.ask("get", "shadow")["value"] == "adaptive"
 
 
 def test_a_request_is_answered_after_the_cycle_that_granted_it(desk):

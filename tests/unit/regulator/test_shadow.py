@@ -15,6 +15,7 @@ from thermoctl.regulator import Regulator
 from thermoctl.signals import (
     Beliefs,
     ChooseController,
+    ChooseShadow,
     Estimate,
     ManualPower,
     Measurement,
@@ -383,3 +384,27 @@ def test_a_bad_shadow_is_refused_by_the_name_of_its_key(shadow, key):
     }  # fmt: skip
     with pytest.raises(ConfigError, match=key):
         load({"loops": {"tank": table}})
+
+
+def test_any_law_can_be_put_in_the_shadow_learns_there_and_takes_over():
+    regulator = Regulator(plan_for(load({"loops": {"tank": TABLE}}).loops["tank"]))
+    law = Rival(power=0.3)
+    regulator.request(ChooseShadow(law))
+    steps = [regulator.step(Measurement(float(t), 37.0)) for t in range(3)]
+    assert [(step.shadow, step.shadow_power) for step in steps] == [("rival", 0.3)] * 3
+    assert [event.name for event in steps[0].events] == ["shadow.changed"]
+    regulator.request(ChooseController("rival"))
+    assert regulator.step(Measurement(3.0, 37.0)).command.power == 0.3
+    regulator.request(ChooseShadow(None))
+    assert regulator.step(Measurement(4.0, 37.0)).shadow is None
+    with pytest.raises(Refused, match="none is in its shadow"):
+        regulator.request(ChooseController("adaptive"))
+
+
+def test_a_shadow_that_is_no_law_or_is_in_charge_already_is_refused():
+    regulator = Regulator(plan_for(load({"loops": {"tank": TABLE}}).loops["tank"]))
+    with pytest.raises(Refused, match="expected a controller for the shadow, got 'pid'"):
+        regulator.request(ChooseShadow("pid"))
+    with pytest.raises(Refused, match="expected another kind than 'adaptive'"):
+        regulator.request(ChooseShadow(regulator.plan.controller))
+    assert regulator.step(Measurement(0.0, 37.0)).events == ()
