@@ -42,8 +42,15 @@ class DaemonProcess:
 
     def call(self, *arguments):
         """Run another command on the same folders, and return what came of it."""
+        return self._run(self.command(*arguments))
+
+    def ask(self, *words):
+        """Run a command as its user would, without a configuration, and return what came of it."""
+        return self._run([sys.executable, "-m", "thermoctl", *words])
+
+    def _run(self, command):
         return subprocess.run(
-            self.command(*arguments),
+            command,
             env=self.environ,
             capture_output=True,
             text=True,
@@ -91,3 +98,12 @@ def start(tmp_path):
         if each.process.poll() is None:
             each.process.kill()
         each.process.wait(PATIENCE_S)
+
+
+@pytest.fixture
+def daemon(start):
+    """Return a daemon that runs and can be asked."""
+    running = start()
+    running.wait_for("board.opened")
+    running.wait_for("socket.opened")
+    return running

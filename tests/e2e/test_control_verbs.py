@@ -19,20 +19,8 @@ AQUARIUM = (Path(__file__).parents[2] / "config" / "aquarium.toml").read_text()
 PATIENCE_S = 15.0
 
 
-def verb(daemon, *words):
-    """Run a command as its user would, without a configuration."""
-    return subprocess.run(
-        [sys.executable, "-m", "thermoctl", *words],
-        env=daemon.environ,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
-
-
 def told(daemon, *words):
-    ended = verb(daemon, *words, "--json")
+    ended = daemon.ask(*words, "--json")
     assert ended.returncode == 0, ended.stderr
     return json.loads(ended.stdout)
 
@@ -41,23 +29,15 @@ def path_of(daemon):
     return daemon.folder / "run" / "thermoctl" / "control.sock"
 
 
-@pytest.fixture
-def daemon(start):
-    running = start()
-    running.wait_for("board.opened")
-    running.wait_for("socket.opened")
-    return running
-
-
 def test_a_day_of_an_operator(daemon):
-    shown = verb(daemon, "status")
+    shown = daemon.ask("status")
     assert shown.returncode == 0
     rows = [line.split(" : ") for line in shown.stdout.splitlines()]
     assert len({len(name) for name, _ in rows}) == 1  # the colons stand below each other
     assert {name.strip(): value for name, value in rows}["Set point"] == "37.50 °C"
-    assert verb(daemon, "set", "40").stdout == "tank : set point 40.00 °C\n"
-    assert verb(daemon, "get", "setpoint_c").stdout == "40.0\n"
-    early = verb(daemon, "output", "30%")
+    assert daemon.ask("set", "40").stdout == "tank : set point 40.00 °C\n"
+    assert daemon.ask("get", "setpoint_c").stdout == "40.0\n"
+    early = daemon.ask("output", "30%")
     assert (early.returncode, "manual" in early.stderr) == (1, True)
     assert told(daemon, "mode", "manual") == {"loop": "tank", "mode": "manual"}
     assert told(daemon, "output", "30%") == {"loop": "tank", "power": 0.3}
@@ -66,7 +46,7 @@ def test_a_day_of_an_operator(daemon):
     assert told(daemon, "controller", "self-tuning-mv")["controller"] == "self-tuning-mv"
     assert told(daemon, "status")["loops"][0]["controller"] == "self-tuning-mv"
     assert (told(daemon, "alarms"), told(daemon, "alarms", "ack")) == ([], [])
-    assert verb(daemon, "status", "--check").returncode == 0
+    assert daemon.ask("status", "--check").returncode == 0
     daemon.wait_for("controller.changed")
     assert daemon.end(signal.SIGTERM)[0] == 0
     assert not path_of(daemon).exists()
@@ -84,29 +64,29 @@ def test_refusals_say_what_was_expected_and_end_as_they_should(daemon):
         (("status", "--socket", str(daemon.folder / "none")), 3, "running daemon"),
         (("status", "--socket", "/" + "x" * 107), 69, "107 bytes"),
     ]:
-        ended = verb(daemon, *words)
+        ended = daemon.ask(*words)
         assert (ended.returncode, ended.stdout) == (code, ""), words
         assert text in ended.stderr, words
         assert ended.stderr.startswith("thermoctl: "), words
     assert told(daemon, "get", "setpoint_c") == 37.5
-    assert json.loads(verb(daemon, "set", "99", "--json").stdout)["error"]["exit_code"] == 1
+    assert json.loads(daemon.ask("set", "99", "--json").stdout)["error"]["exit_code"] == 1
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may use every socket")
 def test_a_socket_of_somebody_else_is_exit_77(daemon):
     path_of(daemon).chmod(0)
-    assert verb(daemon, "status").returncode == 77
+    assert daemon.ask("status").returncode == 77
 
 
 def test_an_active_alarm_makes_the_check_exit_4(start):
     daemon = start(config=AQUARIUM.replace("initial_c = 25.0", "initial_c = 70.0"))
     daemon.wait_until(
-        lambda: "latched" in verb(daemon, "get", "state").stdout, "loop that is latched"
+        lambda: "latched" in daemon.ask("get", "state").stdout, "loop that is latched"
     )
-    assert verb(daemon, "status", "--check").returncode == 4
+    assert daemon.ask("status", "--check").returncode == 4
     (row,) = told(daemon, "alarms")
     assert (row["code"], row["latched"]) == ("trip.over_temperature", True)
-    refused = verb(daemon, "alarms", "ack")
+    refused = daemon.ask("alarms", "ack")
     assert (refused.returncode, "still stands" in refused.stderr) == (1, True)
 
 
@@ -145,11 +125,11 @@ def test_watch_ends_with_3_when_the_daemon_does(daemon):
 def test_a_killed_daemon_leaves_a_socket_that_the_next_one_replaces(daemon):
     daemon.end(signal.SIGKILL)
     assert path_of(daemon).is_socket()
-    assert verb(daemon, "status").returncode == 3
+    assert daemon.ask("status").returncode == 3
     daemon.start()
     daemon.wait_for("socket.opened", 2)
     daemon.wait_for("board.opened", 2)
-    daemon.wait_until(lambda: verb(daemon, "status").returncode == 0, "answer")
+    daemon.wait_until(lambda: daemon.ask("status").returncode == 0, "answer")
 
 
 def test_a_second_daemon_leaves_the_first_its_socket_and_controls_without_one(daemon):

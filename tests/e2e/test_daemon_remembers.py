@@ -2,8 +2,6 @@
 
 import json
 import signal
-import subprocess
-import sys
 
 import pytest
 
@@ -51,20 +49,8 @@ def folder(tmp_path):
     return folder
 
 
-def verb(daemon, *words):
-    """Run a command as its user would, without a configuration."""
-    return subprocess.run(
-        [sys.executable, "-m", "thermoctl", *words],
-        env=daemon.environ,
-        capture_output=True,
-        text=True,
-        timeout=15.0,
-        check=False,
-    )
-
-
 def value(daemon, key):
-    return json.loads(verb(daemon, "get", key, "--json").stdout)
+    return json.loads(daemon.ask("get", key, "--json").stdout)
 
 
 def test_a_start_takes_a_model_up_and_the_end_stores_it_again(folder, start):
@@ -110,7 +96,7 @@ def test_a_controller_that_was_put_in_charge_is_in_charge_after_a_kill(folder, s
     daemon = start(config=PID)
     daemon.wait_for("board.opened")
     daemon.wait_for("socket.opened")
-    assert verb(daemon, "controller", "adaptive").returncode == 0
+    assert daemon.ask("controller", "adaptive").returncode == 0
     run = folder / "run-tank.json"
     daemon.wait_until(lambda: '"exchanged": true' in run.read_text(), "record of the exchange")
     daemon.end(signal.SIGKILL)

@@ -117,14 +117,6 @@ def test_the_shadow_of_a_bench_test_takes_over_when_it_is_confirmed(terminal):
     assert bench.received.endswith("\x1b[?1049l")
 
 
-@pytest.fixture
-def daemon(start):
-    running = start()
-    running.wait_for("board.opened")
-    running.wait_for("socket.opened")
-    return running
-
-
 def test_a_watch_on_a_terminal_is_the_live_view_and_its_keys_ask_the_daemon(daemon, terminal):
     view = terminal("watch", environ=daemon.environ)
     view.wait_for("set 37.50 °C")
