@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from thermoctl.regulator import Limits
 from thermoctl.regulator.alarms import AlarmRegister
+from thermoctl.regulator.judge import Judged, Verdict, judge
 from thermoctl.regulator.pairing import Agreement, Pair, Pairing
 from thermoctl.signals import Measurement, Quality
 
@@ -59,8 +60,9 @@ def one(shown):
 
 
 def alike(one, other):
-    """Whether two measurements are the same, NaN included."""
-    return repr(one) == repr(other)
+    """Whether two measurements are the same, NaN included, and 0 of either sign."""
+    same_c = other.temperature_c == pytest.approx(one.temperature_c, rel=0.0, abs=0.0, nan_ok=True)
+    return same_c and (one.t_s, one.quality, one.ends_c) == (other.t_s, other.quality, other.ends_c)
 
 
 SHOWN = st.one_of(
@@ -124,6 +126,34 @@ def test_whatever_one_of_them_lacks_the_other_goes_on(row):
         assert read.quality is quality
         assert read.temperature_c == pytest.approx(temperature_c, nan_ok=True)
         assert read.ends_c == ends_c
+
+
+def test_the_time_of_both_is_that_of_the_latest_good_sample():
+    later, silent = Measurement(10.5, 30.0), Measurement(11.0, quality=MISSING)
+    assert House().pairing.fuse(Measurement(10.0, 30.0), later).t_s == 10.5
+    assert House().pairing.fuse(Measurement(10.0, 30.0), silent).t_s == 10.0
+    assert House().pairing.fuse(silent, silent).t_s == 11.0
+
+
+HEATS_AND_COOLS = Limits(60.0, -10.0, 0.0, 60.0, power_min=-1.0)
+
+
+@pytest.mark.parametrize(
+    ("limits", "first_c", "second_c", "verdict"),
+    [
+        (LIMITS, 30.0, 61.0, Verdict.OVER),
+        (LIMITS, 30.0, -11.0, Verdict.GOOD),
+        (COOLS, 30.0, -11.0, Verdict.UNDER),
+        (COOLS, 30.0, 61.0, Verdict.GOOD),
+        (HEATS_AND_COOLS, 30.0, 61.0, Verdict.OVER),
+        (HEATS_AND_COOLS, 30.0, -11.0, Verdict.UNDER),
+    ],
+)
+def test_one_sensor_trips_where_an_actuator_could_bring_the_plant(
+    limits, first_c, second_c, verdict
+):
+    for pair in ((first_c, second_c), (second_c, first_c)):
+        assert judge(Judged(), House(limits).fuse(*pair), limits).verdict is verdict
 
 
 def test_a_sensor_that_is_open_or_shorted_is_told_at_once_and_one_that_is_silent_after_5_s():
