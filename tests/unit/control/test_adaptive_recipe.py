@@ -9,7 +9,7 @@ import pytest
 from thermoctl.control.adaptive.bank import Bank
 from thermoctl.control.adaptive.coasting import FASTEST_PERIODS, power_for
 
-SHAPES = [(0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.10, 0.15, 0.75)]
+SHAPES = [(0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.05, 0.10, 0.85)]
 
 
 @dataclass
@@ -54,11 +54,13 @@ class Filter:
         D = np.diag([root, root, 1.0, 1.0])
         self.P = D @ self.P @ D
 
-    def correct(self, y, R, u_min, limit_loss):
+    def correct(self, y, R, u_min, limit_loss, e):
         S, nu = self.P[1, 1] + R, y - self.x[1]
         K = self.P[:, 1] / S
+        K[3] *= e if self.P[3, 3] <= (0.2 * self.x[3]) ** 2 else 1.0
         self.x = self.x + K * nu
-        self.P = self.P - np.outer(K, self.P[1])
+        A = np.eye(4) - np.outer(K, [0, 1, 0, 0])
+        self.P = A @ self.P @ A.T + R * np.outer(K, K)
         self.P = (self.P + self.P.T) / 2
         self.x[3] = min(max(self.x[3], 2e-5), 0.5)
         if limit_loss:
@@ -130,7 +132,7 @@ class PlainBank:
         for each in self.filters:
             if jumped:
                 each.inflate(nu_m, R)
-            nu, S = each.correct(y, R, self.u_min, self.k * self.h > 60)
+            nu, S = each.correct(y, R, self.u_min, self.k * self.h > 60, e)
             if heard:
                 each.ln_w -= 0.5 * e * (math.log(S) + min(nu**2 / S, 9))
             told.append(math.exp(-0.5 * (math.log(S) + min(nu**2 / S, 9))))
@@ -147,7 +149,8 @@ class PlainBank:
         rows = [each.coasting(self.powers, self.u_min, self.u_max) for each in self.filters]
         u_ss, coasting, lag, beta = w @ np.array(rows) / w.sum()
         self.told = (u_ss, coasting, lag, beta)
-        Tc = max(3.0, FASTEST_PERIODS * self.h, self.kappa * lag)
+        heavy = min(max(beta * lag / 1.2, 1.0), 2.0)
+        Tc = max(3.0, FASTEST_PERIODS * self.h, self.kappa * heavy * lag)
         tau, before = 0.4 * Tc, self.powers[0]
         aim = coasting + beta * tau * (before - u_ss)
         wanted = u_ss + (r - aim) / (beta * Tc)

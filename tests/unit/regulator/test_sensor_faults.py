@@ -76,12 +76,14 @@ def test_before_a_model_is_known_the_last_output_is_held_for_three_seconds(drive
     assert seconds <= 3
 
 
-def test_with_the_model_of_a_first_warm_up_a_ride_gives_next_to_nothing(drive_with):
+def test_at_full_power_no_holding_power_is_known_so_the_last_is_held_for_three_seconds(drive_with):
     cold = drive_with(water_c=25.0, controller="adaptive")
     assert cold.run(20).command.power == 1.0
-    rides = [cold.step(Quality.MISSING) for _ in range(61)]
-    assert max(step.command.power for step in rides) < 0.1
-    assert (rides[0].state, rides[-1].state) == (State.RIDE, State.SAFE)
+    assert cold.steps[-1].beliefs.holding_power is None
+    lost = [cold.step(Quality.MISSING) for _ in range(61)]
+    assert lost[0].state is State.HOLD
+    assert {step.command.power for step in lost[3:]} == {0.0}
+    assert lost[-1].state is State.SAFE
 
 
 def test_a_sensor_that_never_answers_never_gets_heat(drive_with):

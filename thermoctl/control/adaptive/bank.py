@@ -215,7 +215,7 @@ class Bank:
             return Met(noise, gate, weights, heard, block)
         if gate.jumped:
             block = filters.inflated(block, nu, R)
-        block, nus, S = filters.corrected(block, y_c, R)
+        block, nus, S = filters.corrected(block, y_c, R, share)
         filters.project(
             block, self.hypotheses, self.u_min, loss=sample * self.period_s > LOSS_FROM_S
         )

@@ -41,6 +41,9 @@ FASTEST_S = 3.0
 FASTEST_PERIODS = 1.5
 """Nor shorter than so many samples: at one sample any error of the gain would be given back whole,
 and below it the loop would be unstable."""
+HEAVY_K, CALMER = 1.2, 2.0
+"""Where full power puts more than so many kelvin on their way within a lag, each tenth by which the
+lag is mistaken is that much overshoot: Tc grows by as much, and no more than so many times."""
 SMOOTHNESS = 0.4
 """The lag of the power itself, as a share of Tc. Noise costs a third of the travel it would cost at
 once, while a power that has far to go is at its limit at once all the same."""
@@ -108,7 +111,7 @@ def power_for(
     setpoint_c : float
         Where the water is to come to rest, in degC; on a ramp, that of `ahead`.
     calmness : float
-        Tc as a share of the lag.
+        Tc as a share of the lag, unless much heat is under way.
     period_s : float
         Time between two samples.
     bounds : tuple of float
@@ -118,7 +121,8 @@ def power_for(
     ramp_power : float
         What lets the water rise with a ramp, beside the holding power.
     """
-    Tc_s = max(FASTEST_S, FASTEST_PERIODS * period_s, calmness * outlook.lag_s)
+    calm = calmness * clamp(outlook.gain * outlook.lag_s / HEAVY_K, 1.0, CALMER)
+    Tc_s = max(FASTEST_S, FASTEST_PERIODS * period_s, calm * outlook.lag_s)
     tau_s = SMOOTHNESS * Tc_s
     resting = outlook.holding_power + ramp_power
     aim_c = outlook.coasting_c + outlook.gain * tau_s * (before - resting)

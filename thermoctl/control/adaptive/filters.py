@@ -45,6 +45,9 @@ DRIFT_Z_K = 0.003
 DRIFT_GAIN_MIN = 1e-4
 """The shares are of no smaller gain than this, in K/s."""
 
+KNOWN_SHARE = 0.2
+"""A gain is known once its standard deviation is at most this share of it."""
+
 GAIN_MIN, GAIN_MAX = 2e-5, 0.5
 """What a heater can do to water, in K/s: 17 W in 200 l, 1,500 W in .7 l."""
 LOSS_MIN, LOSS_MAX = 0.5, 0.95
@@ -91,7 +94,7 @@ class Drift(NamedTuple):
 
 
 def drift(period_s: float) -> Drift:
-    """Return diag((.06 b)^2, .003^2, (.0015 b)^2, (2e-4 b)^2) times the period.
+    """Return diag((.08 b)^2, .003^2, (.0008 b)^2, (2e-4 b)^2) times the period.
 
     The gain of a period, and the unit of d and beta, are h times those of a second.
     """
@@ -184,14 +187,26 @@ def inflated(block: Block, nu: float, R: float) -> Block:
     return after
 
 
-def corrected(block: Block, y_c: float, R: float) -> tuple[Block, Array, Array]:
-    """Return the block after reading `y_c`, the innovations and their variances."""
+def corrected(block: Block, y_c: float, R: float, proof: float = 1.0) -> tuple[Block, Array, Array]:
+    """Return the block after reading `y_c`, the innovations and their variances.
+
+    Where the gain beta is known, it is corrected by the share `proof` of what Kalman would: at 0 it
+    is *considered*, as Schmidt does, and not estimated. Its uncertainty counts in all else, and
+    what binds it to the rest is kept. In a closed loop at rest power follows the noise of the
+    reading, and a gain that is estimated there climbs for hours, surer at every step.
+    """
     S = block[Z, Z] + R
     nu = y_c - block[Z, X]
     root = np.sqrt(S)
     g = block[Z] / root  # P H' / sqrt S, and beside it:
     np.divide(nu, -root, out=g[X])
     after = g[:X, None] * g
+    if proof < 1.0:  # of beta K = p g / sqrt S: Joseph's form differs from P - g g' here alone
+        known = block[BETA, BETA] <= (KNOWN_SHARE * block[BETA, X]) ** 2
+        p = np.where(known, proof, 1.0)
+        after[BETA, X] *= p
+        p *= 2.0 - p
+        after[BETA, BETA] *= p
     np.subtract(block, after, out=after)  # P - g g', x + g nu / sqrt S
     return after, nu, S
 
