@@ -7,6 +7,7 @@ they are slow. One that fails is dropped and told of, and the loop goes on.
 from __future__ import annotations
 
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Generic, TypeVar
 
@@ -21,7 +22,7 @@ _FEED = 1_200
 _TURN_S = 0.5
 
 
-class Beside(Generic[W]):
+class Beside(ABC, Generic[W]):
     """Shows finished cycles to a watch of each loop, in a thread.
 
     Parameters
@@ -36,17 +37,15 @@ class Beside(Generic[W]):
         Called as ``report(name, loop, **fields)`` in the thread.
     """
 
-    def __init__(
-        self, name: str, failed: str, watches: Mapping[str, W], report: Report
-    ) -> None:
+    def __init__(self, name: str, failed: str, watches: Mapping[str, W], report: Report) -> None:
         self._failed, self._watches, self._report = failed, dict(watches), report
         self._feed: Feed[Cycle] = Feed(_FEED)
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
+    @abstractmethod
     def look(self, watch: W, cycle: Cycle) -> None:
         """Show `cycle` to its watch; the one thing a service has to add."""
-        raise NotImplementedError
 
     def start(self) -> None:
         """Begin to watch."""

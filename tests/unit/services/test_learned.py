@@ -172,3 +172,4 @@ def test_a_folder_that_takes_nothing_costs_nothing(tmp_path):
     (tmp_path / "file").write_text("no folder")
     keeper = ModelKeeper(store_at(tmp_path / "file"), Clock())
     keeper.store({"tank": Cycle({"adaptive": MODEL})}, at_end=True)
+    assert (tmp_path / "file").read_text() == "no folder"
