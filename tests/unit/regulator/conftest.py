@@ -1,5 +1,6 @@
 """A regulator on a small plant with lag, driven second by second."""
 
+import copy
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -64,11 +65,17 @@ def drive_with() -> Callable[..., Drive]:
     return make
 
 
-@pytest.fixture
-def warm(drive_with: Callable[..., Drive]) -> Drive:
-    """A regulator that has held its set point for five minutes."""
-    drive = drive_with()
+@pytest.fixture(scope="session")
+def held() -> Drive:
+    """A regulator that has held its set point for five minutes, to be copied and not driven."""
+    drive = Drive(regulator_for(load({"loops": {"tank": LOOP}})))
     drive.run(300)
     assert drive.steps[-1].state is State.RUN
     assert 0.05 < drive.power < 0.6
     return drive
+
+
+@pytest.fixture
+def warm(held: Drive) -> Drive:
+    """A regulator that has held its set point for five minutes."""
+    return copy.deepcopy(held)
