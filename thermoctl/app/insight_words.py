@@ -32,11 +32,15 @@ def insight_lines(told: Mapping[str, Any] | None) -> list[tuple[str, str]]:
 def _quantities(rows: list[Mapping[str, Any]]) -> list[tuple[str, str]]:
     """Return a line for each label; one quantity in several units is one line."""
     found: dict[str, list[str]] = {}
+    why_not: dict[str, str] = {}
     for row in rows:
-        texts = found.setdefault(str(row["label"]).capitalize(), [])
-        if row["value"] is not None:
+        label = str(row["label"]).capitalize()
+        texts = found.setdefault(label, [])
+        if row["value"] is None:
+            why_not.setdefault(label, str(row["text"]))
+        else:
             texts.append(str(row["text"]))
-    return [(label, ", ".join(texts) or UNKNOWN) for label, texts in found.items()]
+    return [(label, ", ".join(texts) or why_not[label]) for label, texts in found.items()]
 
 
 def _time(iso: str | None) -> str:

@@ -14,7 +14,14 @@ from thermoctl.insight.wording import UNKNOWN, number, plain
 from thermoctl.signals import PlantBelief
 
 NO_HEATER = "heater_w is not configured"
+NOT_YET = "not known yet"
 _SIGMAS = 2.0
+
+VAGUE_POWER = 0.5
+"""A power to hold that may be off by so much of full power says nothing of the plant."""
+
+VAGUE_LAG = 10.0
+"""A lag that may be so many times another one is what was assumed beforehand, and not learnt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +43,14 @@ class Known:
         return Known(value, abs(value) * shares if self.value else own)
 
 
+_NOTHING = Known(math.nan, math.nan)
+
+
+def _sets_apart(gain: Known) -> bool:
+    """Return whether the gain differs from none by more than its error; NaN does not."""
+    return abs(gain.value) > _SIGMAS * gain.sd
+
+
 def rows(
     plant: PlantBelief,
     gain: Known,
@@ -54,9 +69,17 @@ def rows(
         How the loss grows with the temperature, in 1/s.
     heater_w : float, optional
         Rated power of the heater in W.
+
+    Notes
+    -----
+    What is no better known than before the first sample has no value: a gain within its own error
+    of none, a power to hold to `VAGUE_POWER`, a lag to `VAGUE_LAG`.
     """
+    gain = gain if _sets_apart(gain) else _NOTHING
     holding = Known(plant.holding_power, plant.holding_power_sd)
     loss = Known(plant.loss_k_per_s, plant.loss_sd_k_per_s)
+    if _SIGMAS * holding.sd > VAGUE_POWER:
+        holding = loss = _NOTHING
     return (
         _row("gain", "gain", gain.scaled(60.0), "K/min"),
         _row("loss", "loss", loss.scaled(60.0), "K/min"),
@@ -75,6 +98,8 @@ def rows(
 
 
 def _lag(plant: PlantBelief) -> Row:
+    if not plant.lag_high_s < VAGUE_LAG * plant.lag_low_s:
+        return _unknown("lag", "lag", "s", NOT_YET)
     low, high = plain(plant.lag_low_s), plain(plant.lag_high_s)
     text = f"{plain(plant.lag_s)} s, between {low} and {high}"
     return Row("lag", "lag", plant.lag_s, None, "s", text, plant.lag_low_s, plant.lag_high_s)
@@ -86,7 +111,8 @@ def _of_heater(
     """Return the rows that need the rated power of the heater."""
     names = (("volume", "water", "l"), ("loss_w", "loss", "W"), ("loss_w_per_k", "loss", "W/K"))
     if heater_w is None or not gain.value > 0.0:
-        why = NO_HEATER if heater_w is None else "power cools"
+        learnt = NOT_YET if math.isnan(gain.value) else "power cools"
+        why = NO_HEATER if heater_w is None else learnt
         return tuple(_unknown(*each, why) for each in names)
     one = Known(physics.litres(heater_w), 0.0)
     capacity = Known(heater_w, 0.0).over(gain)
@@ -105,7 +131,7 @@ def _of_heater(
 
 def _row(name: str, label: str, known: Known, unit: str) -> Row:
     if not (math.isfinite(known.value) and math.isfinite(known.sd)):
-        return _unknown(name, label, unit, "not known yet")
+        return _unknown(name, label, unit, NOT_YET)
     text = f"{number(known.value, known.sd)} {unit}"
     return Row(name, label, known.value, _SIGMAS * known.sd, unit, text)
 

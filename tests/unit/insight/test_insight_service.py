@@ -106,7 +106,7 @@ def test_a_status_has_a_line_a_quantity_and_the_newest_changes():
     lines = insight_lines(told)
     assert ("Learning", "paused: nothing to learn") in lines
     assert ("Loss", "0.5 ± 0.1 K/min, 270 ± 10 W") in lines
-    assert ("Water", "–") in lines
+    assert ("Water", "– heater_w is not configured") in lines
     assert [text[6:] for name, text in lines if name == "Changed"] == ["loss 0", "loss 1", "loss 2"]
     assert [text[6:] for name, text in lines if name == "Drift"] == ["the water is low"]
 

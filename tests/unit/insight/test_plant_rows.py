@@ -63,3 +63,18 @@ def test_what_is_no_number_is_not_known():
     row = named(PLANT, Known(math.nan, 0.1))["gain"]
     assert row.value is None
     assert row.text.startswith("–")
+
+
+@pytest.mark.parametrize(
+    ("vague", "names"),
+    [
+        ({"gain": Known(0.01, 0.005)}, ["gain", "volume", "loss_w", "loss_w_per_k"]),
+        ({"holding_power_sd": 0.3}, ["loss", "holding_power", "loss_w"]),
+        ({"lag_low_s": 3.0, "lag_high_s": 139.0}, ["lag"]),
+    ],
+)
+def test_what_has_not_been_learnt_yet_is_a_dash_with_the_reason(vague, names):
+    gain = vague.pop("gain", GAIN)
+    told = named(replace(PLANT, **vague), gain, Known(3e-4, 3e-5), heater_w=1500.0)
+    assert {name for name, row in told.items() if row.value is None} == set(names)
+    assert {told[name].text for name in names} == {"– not known yet"}
