@@ -35,6 +35,10 @@ from thermoctl.signals import ShadowScore
 
 _LATE_PERIODS: Final = 3.0
 _LATE_S: Final = 3.0
+_MINUTE_S: Final = 60.0
+_SAME_K: Final = 0.005  # closer than two decimals show
+_MODES: Final = ("off", "manual", "auto")
+_OVER_S: Final = 1.0  # a load of 0 ends the one before, however long it lasts itself
 _MINUTES: Final = {"min": 1.0, "h": 60.0}
 _REPLY_S: Final = 5.0  # beyond what the daemon itself gives its loop
 
@@ -65,6 +69,13 @@ def _power(text: str) -> float:
     return power
 
 
+def _mode(text: str) -> str:
+    """Return the name of a mode that may be asked for; ``ValueError`` if it is none."""
+    if text not in _MODES:
+        raise ValueError(f"expected one of {', '.join(_MODES)}, got {text!r}")
+    return text
+
+
 def _load(text: str) -> float:
     """Return a load in [-1, 1], written as a power; ``ValueError`` if it is none."""
     size = text.strip().removeprefix("-")
@@ -76,7 +87,7 @@ def _rate(text: str) -> float:
     match = re.fullmatch(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(?:K|°C|degC)?\s*/\s*(min|h)\s*", text)
     rate_k_per_min = math.nan if match is None else float(match[1]) / _MINUTES[match[2]]
     if not rate_k_per_min > 0.0:
-        raise ValueError(f"expected a rate above 0 such as 2/min or 30K/h, got {text!r}")
+        raise ValueError(f"expected a rate above 0 a min or h such as 2/min or 30K/h, got {text!r}")
     return rate_k_per_min
 
 
@@ -145,13 +156,13 @@ def set_command(
 ) -> None:
     """Hold another temperature, in °C; at once, unless a rate limits it."""
     told = _asked(socket, "set", loop=loop, value_c=value_c, rate_k_per_min=ramp)
-    at = "" if ramp is None else f", at {ramp:g} K/min"
+    at = "" if ramp is None else f", at {ramp:.3g} K/min"
     words = f"set point {_plain(numbers.temperature(told['setpoint_c']))}{at}"
     _tell(told, as_json, lambda: words)
 
 
 @click.command(epilog=examples("thermoctl mode auto", "thermoctl mode off --loop tank"))
-@click.argument("mode", type=click.Choice(["off", "manual", "auto"]))
+@click.argument("mode", metavar="off|manual|auto", type=Parsed("mode", _mode))
 @loop_option
 @socket_option
 @json_option
@@ -177,19 +188,29 @@ def output(power: float, loop: str | None, socket: Path | None, as_json: bool) -
 
 @click.command(
     context_settings={"ignore_unknown_options": True},  # -10% is a load
-    epilog=examples("thermoctl load 20% --for 10m", "thermoctl load 0 --for 1s"),
+    epilog=examples("thermoctl load 20% --for 10m", "thermoctl load 0"),
 )
 @click.argument("power", metavar="POWER", type=_LOAD)
-@click.option("--for", "duration_s", type=Duration(), required=True, help="How long: 10m, 1h.")
+@click.option(
+    "--for", "duration_s", type=Duration(), help="How long: 10m, 1h; a load of 0 needs none."
+)
 @loop_option
 @socket_option
 @json_option
 def load(
-    power: float, duration_s: float, loop: str | None, socket: Path | None, as_json: bool
+    power: float, duration_s: float | None, loop: str | None, socket: Path | None, as_json: bool
 ) -> None:
     """Say what the plant is about to lose beside its usual loss."""
+    if duration_s is None and power:
+        raise click.UsageError(
+            f"expected --for DURATION with a load of {100.0 * power:g} %, got none"
+        )
+    duration_s = duration_s or _OVER_S
     told = _asked(socket, "load", loop=loop, power=power, duration_s=duration_s)
-    _tell(told, as_json, lambda: f"load {100.0 * told['power']:g} % for {told['duration_s']:g} s")
+    words = f"load {100.0 * told['power']:g} %" + (
+        f" for {told['duration_s']:g} s" if power else ""
+    )
+    _tell(told, as_json, lambda: words)
 
 
 @click.command(epilog=examples("thermoctl controller self-tuning-mv"))
@@ -285,7 +306,8 @@ def _described(record: Mapping[str, Any]) -> str:
         "Loop": record["loop"],
         "Temperature": numbers.temperature(record["temperature_c"]),
         "Reading": record["quality"],
-        "Set point": numbers.temperature(record["setpoint_c"]),
+        "Set point": numbers.temperature(record["setpoint_c"]) + _on_the_way(record),
+        **_foretold(record),
         "Deviation": numbers.difference(deviation_k),
         "Power": numbers.power(record["power"]),
         "Power taken": numbers.power(record["accepted_power"]),
@@ -300,6 +322,26 @@ def _described(record: Mapping[str, Any]) -> str:
     lines = [*rows.items(), *insight_lines(record.get("insight"))]
     width = max(len(name) for name, _ in lines)
     return _plain("\n".join(f"{name:<{width}} : {value}" for name, value in lines))
+
+
+def _on_the_way(record: Mapping[str, Any]) -> str:
+    """Return where the ramp to the set point is; empty without one."""
+    told = record["reference_c"]
+    if record["mode"] != "auto" or told is None or abs(told - record["setpoint_c"]) < _SAME_K:
+        return ""
+    return f", ramp at {numbers.temperature(told)}"
+
+
+def _foretold(record: Mapping[str, Any]) -> dict[str, str]:
+    """Return the lines about what is to come: arrival and a load, where there are any."""
+    told, lines = record["feasible"], {}
+    if told["arrival_s"]:
+        minutes = max(1.0, 2.0 * (told["arrival_sd_s"] or 0.0) / _MINUTE_S)
+        error = numbers.with_unit(numbers.number(minutes, 0), "min")
+        lines["Arrives"] = f"in {numbers.span(told['arrival_s'])} ± {error}"
+    if record["load"]:
+        lines["Load told"] = numbers.power(record["load"])
+    return lines
 
 
 def _shadow(record: Mapping[str, Any]) -> dict[str, str]:

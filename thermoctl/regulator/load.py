@@ -41,7 +41,9 @@ class KnownLoad:
         if not is_finite_number(power) or not -1.0 <= power <= 1.0:
             raise Refused(f"expected a load from -1 to 1 of full power, got {power!r}")
         if not is_finite_number(duration_s) or not 0.0 < duration_s <= LONGEST_S:
-            raise Refused(f"expected a duration above 0, up to {LONGEST_S:g} s, got {duration_s!r}")
+            raise Refused(
+                f"expected a duration above 0, up to {LONGEST_S:.0f} s, got {duration_s!r}"
+            )
         self._power, self._begin_s, self._end_s = float(power), t_s, t_s + float(duration_s)
         self._told = True
         self._emit("load.changed", power=self._power, duration_s=float(duration_s))

@@ -59,7 +59,10 @@ class Wishes:
     def want_setpoint(self, value_c: float, rate_k_per_min: float | None = None) -> None:
         """Hold `value_c`, in degC, and go there no faster than asked for or configured."""
         if self._led:
-            raise Refused(f"expected it of the loop that leads this one, got {value_c!r} for this")
+            raise Refused(
+                "expected a set point for the loop that leads this one,"
+                f" got {value_c!r} for the one that follows"
+            )
         accepted_c = self._limits.accept_setpoint(value_c)
         rate_k_per_s = accept_rate(rate_k_per_min, self._most_k_per_s)
         if accepted_c != self.setpoint_c:

@@ -3,9 +3,10 @@
 import json
 
 import pytest
+from click.testing import CliRunner
 
 from thermoctl.app.clerk import Clerk
-from thermoctl.app.control_commands import _LOAD, _RATE
+from thermoctl.app.control_commands import _LOAD, _RATE, load, mode
 from thermoctl.services.control_protocol import Call, CallError, asking, parse
 from thermoctl.signals import Load, SetPoint
 
@@ -92,3 +93,15 @@ def test_a_load_becomes_a_request(tmp_path):
     requests, reply = granted(Call("load", 1, None, 0.2, 600.0), tmp_path)
     assert requests == [Load(0.2, 600.0)]
     assert reply == {"loop": "tank", "power": 0.2, "duration_s": 600.0}
+
+
+def test_a_load_above_none_that_does_not_say_how_long_is_refused_by_name():
+    told = CliRunner().invoke(load, ["20%"])
+    assert told.exit_code == 2
+    assert "expected --for DURATION with a load of 20 %, got none" in told.output
+
+
+def test_a_mode_that_is_none_is_refused_with_those_there_are():
+    told = CliRunner().invoke(mode, ["of"])
+    assert told.exit_code == 2
+    assert "expected one of off, manual, auto, got 'of'" in told.output

@@ -1,4 +1,4 @@
-"""What `thermoctl status` says of a loop with a controller in shadow."""
+"""What `thermoctl status` says of a loop: its shadow, its ramp, and what is to come."""
 
 from dataclasses import asdict
 
@@ -38,3 +38,18 @@ def test_a_shadow_that_is_not_compared_yet_says_so(record):
 
 def test_a_loop_without_a_shadow_has_no_line_of_it(record):
     assert "Shadow" not in rows(record | {"shadow": None})
+
+
+def test_a_ramp_says_where_it_is_while_the_controller_follows_it(record):
+    way = {"setpoint_c": 40.0, "reference_c": 25.8}
+    assert rows(record | way)["Set point"] == "40.00 °C, ramp at 25.80 °C"
+    assert rows(record | way | {"mode": "off"})["Set point"] == "40.00 °C"
+    assert rows(record | way | {"reference_c": 40.0})["Set point"] == "40.00 °C"
+
+
+def test_an_arrival_and_a_load_have_lines_only_while_there_are_any(record):
+    feasible = record["feasible"] | {"arrival_s": 720.0, "arrival_sd_s": 45.0}
+    told = rows(record | {"feasible": feasible, "load": 0.2})
+    assert (told["Arrives"], told["Load told"]) == ("in 12 min ± 2 min", "20.0 %")
+    quiet = rows(record | {"feasible": feasible | {"arrival_s": None}, "load": 0.0})
+    assert not {"Arrives", "Load told"} & set(quiet)

@@ -153,7 +153,7 @@ def test_by_hand_the_bath_s_power_is_still_a_set_point_of_the_block():
 
 def test_a_set_point_for_a_loop_that_follows_is_refused():
     bench = Bench().run(1)
-    with pytest.raises(Refused, match="of the loop that leads this one, got 30"):
+    with pytest.raises(Refused, match="for the loop that leads this one, got 30"):
         bench.regulator("block").request(SetPoint(30.0))
 
 
