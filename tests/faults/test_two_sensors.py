@@ -105,7 +105,12 @@ def test_a_colder_sensor_beyond_the_lower_trip_ends_no_heating():
 
 @pytest.mark.parametrize("name", ["temperature", "temperature2"])
 @pytest.mark.parametrize(
-    ("shown_c", "what"), [(math.nan, "missing"), (1000.0, "open"), (-270.0, "short")]
+    ("shown_c", "what"),
+    [
+        pytest.param(math.nan, "missing", marks=pytest.mark.slow),
+        (1000.0, "open"),
+        pytest.param(-270.0, "short", marks=pytest.mark.slow),
+    ],
 )
 def test_with_one_of_two_sensors_gone_control_goes_on(name, shown_c, what):
     tank = Tank(600)
@@ -133,6 +138,7 @@ def test_with_both_gone_it_is_as_with_one():
 # -- one of them drifts ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_k_per_min", [0.1, -0.1])
 def test_a_drift_is_told_and_the_water_stays_within_the_limit_and_never_gets_too_hot(
     rate_k_per_min,
@@ -159,6 +165,7 @@ def test_a_drift_is_told_and_the_water_stays_within_the_limit_and_never_gets_too
         assert np.abs(off_k[-300:]).max() < 0.1
 
 
+@pytest.mark.slow
 def test_a_drift_without_end_never_brings_the_water_to_the_trip():
     tank = Tank(600)
     tank.board.disturb("drift", -10.0)
@@ -171,6 +178,7 @@ def test_a_drift_without_end_never_brings_the_water_to_the_trip():
     assert tank.step.state is State.LATCHED  # the sensor shows what no water may
 
 
+@pytest.mark.slow
 def test_a_cold_start_with_a_sensor_of_20_s_beside_one_of_6_s_is_no_disagreement():
     document = load(default_profile()).model_dump(exclude_none=True)
     (table,), (board,) = document["loops"].values(), document["boards"].values()
