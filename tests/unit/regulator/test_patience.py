@@ -56,6 +56,7 @@ def test_every_other_sample_is_enough_to_control_on(warm):
     assert abs(warm.water_c - 37.5) < 0.5
 
 
+@pytest.mark.slow
 def test_spikes_every_other_sample_for_an_hour_are_never_believed(warm):
     steps = play(warm, "SG", 3600)
     assert [step for step in steps[::2] if "sensor.spike" not in names(step)] == []

@@ -131,7 +131,7 @@ def test_an_idle_loop_keeps_its_reference_at_the_plant(drive_with):
     assert drive.step().reference_c == pytest.approx(drive.water_c, abs=0.05)
 
 
-@pytest.mark.parametrize("rate_k_per_min", [1.0, 0.2])
+@pytest.mark.parametrize("rate_k_per_min", [1.0, pytest.param(0.2, marks=pytest.mark.slow)])
 def test_the_default_follows_a_ramp_without_lagging_behind(drive_with, rate_k_per_min):
     drive = drive_with(water_c=32.0)
     drive.run(1200)
