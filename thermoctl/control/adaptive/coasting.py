@@ -45,8 +45,8 @@ HEAVY_K, CALMER = 1.2, 2.0
 """Where full power puts more than so many kelvin on their way within a lag, each tenth by which the
 lag is mistaken is that much overshoot: Tc grows by as much, and no more than so many times."""
 SMOOTHNESS = 0.4
-"""The lag of the power itself, as a share of Tc. Noise costs a third of the travel it would cost at
-once, while a power that has far to go is at its limit at once all the same."""
+"""The lag of the power itself, as a share of Tc. Noise costs a good deal less travel than at once,
+while a power that has far to go is at its limit at once all the same."""
 
 
 class Outlook(NamedTuple):

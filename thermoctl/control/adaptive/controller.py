@@ -83,7 +83,8 @@ class Adaptive:
 
     48 hypotheses about lag and its shape each learn water temperature, loss and gain; they are
     weighted by how well they predicted. The power cancels the error of the temperature at which
-    the water would come to rest, within :math:`T_c = \max(3\,\mathrm{s}, 1.5\,h, \kappa L)`.
+    the water would come to rest, within :math:`T_c = \max(3\,\mathrm{s}, 1.5\,h, \kappa L)`, or up
+    to twice that where full power has much heat under way.
 
     Parameters
     ----------

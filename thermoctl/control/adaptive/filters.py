@@ -202,11 +202,11 @@ def corrected(block: Block, y_c: float, R: float, proof: float = 1.0) -> tuple[B
     np.divide(nu, -root, out=g[X])
     after = g[:X, None] * g
     if proof < 1.0:  # of beta K = p g / sqrt S: Joseph's form differs from P - g g' here alone
-        known = block[BETA, BETA] <= (KNOWN_SHARE * block[BETA, X]) ** 2
-        p = np.where(known, proof, 1.0)
-        after[BETA, X] *= p
-        p *= 2.0 - p
-        after[BETA, BETA] *= p
+        most = KNOWN_SHARE * block[BETA, X]
+        most *= most
+        gain, known = after[BETA], block[BETA, BETA] <= most
+        np.multiply(gain[X], proof, out=gain[X], where=known)
+        np.multiply(gain[BETA], proof * (2.0 - proof), out=gain[BETA], where=known)
     np.subtract(block, after, out=after)  # P - g g', x + g nu / sqrt S
     return after, nu, S
 
