@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from thermoctl.app.advice import advice_for
 from thermoctl.app.cycle_record import iso_time
 from thermoctl.app.options import (
     Commands,
@@ -65,9 +66,17 @@ def alarms(
     if not rows:
         click.echo("no loop is latched" if client is None else "no alarm")
     for row in rows:
-        over = "" if row["active"] else " (over, not acknowledged)"
-        since = row["since"] or "unknown"
-        click.echo(f"{row['loop']} : {row['code']} since {since}: {row['text']}{over}")
+        for line in _described(row):
+            click.echo(line)
+
+
+def _described(row: Mapping[str, Any]) -> list[str]:
+    """Return what is wrong in one line, and what it means in another."""
+    over = "" if row["active"] else " (over, not acknowledged)"
+    since = row["since"] or "unknown"
+    advice = advice_for(row["code"])
+    told = f"{row['loop']} : {row['code']} since {since}: {row['text']}{over}"
+    return [told, f"    {advice}"] if advice else [told]
 
 
 @alarms.command()

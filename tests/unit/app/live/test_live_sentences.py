@@ -50,3 +50,11 @@ def test_no_field_can_bring_a_nan_or_a_template_into_a_sentence() -> None:
 def test_a_temperature_in_words_of_a_log_wears_the_sign_of_the_screen() -> None:
     said = sentence(Event(0.0, "request.refused", {"why": "expected 5 to 55 degC, got 60 degC."}))
     assert said.text == "Refused: expected 5 to 55\u00a0°C, got 60\u00a0°C."
+
+
+def test_a_heater_in_doubt_wears_a_mark_and_a_faulty_one_an_alarm():
+    marks = {
+        name: sentence(Event(0.0, name, {"text": "cold"})).mark
+        for name in ("heater.questioned", "heater.reversed", "heater.no_response")
+    }
+    assert list(marks.values()) == [Mark.WARNING, Mark.ALARM, Mark.ALARM]
