@@ -10,6 +10,7 @@ import errno
 import io
 import json
 import os
+import re
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -114,7 +115,8 @@ def _usage(error: click.ClickException) -> str:
         param = error.param
         hint = error.param_hint or (param.get_error_hint(error.ctx) if param else "")
         hint = (hint if isinstance(hint, str) else " / ".join(hint)).replace("'", "")
-        text = f"{hint}: {error.message}" if hint else error.message
+        told = _expected(error) or error.message
+        text = f"{hint}: {told}" if hint else told
     else:
         text = error.format_message()
     text = " ".join(text.split()).removesuffix(".")
@@ -124,6 +126,26 @@ def _usage(error: click.ClickException) -> str:
     if type(error).__name__ == "NoArgsIsHelpError":  # since click 8.2, with a whole page for text
         text = f"expected a command, {_commands(context)}"
     return text if context is None else f"{text}; see {context.command_path} --help"
+
+
+_TOLD = re.compile(r"(?s)(?P<got>'.*'|[-+.\w]+) is not (?:one of|in the range|'|a valid).*")
+
+
+def _expected(error: click.BadParameter) -> str:
+    """Return what was expected and what came, for the types that click words by itself."""
+    kind, told = (error.param.type if error.param else None), _TOLD.fullmatch(error.message)
+    if told is None:
+        return ""
+    match kind:
+        case click.Choice():
+            expected = f"one of {', '.join(map(str, kind.choices))}"
+        case click.IntRange(min=low, max=None) if low is not None:
+            expected = f"a whole number from {low} on"
+        case click.IntRange():
+            expected = f"a whole number from {kind.min} to {kind.max}"
+        case _:
+            return ""
+    return f"expected {expected}, got {told['got']}"
 
 
 def _commands(context: click.Context | None) -> str:

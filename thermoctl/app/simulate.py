@@ -196,7 +196,10 @@ def terminal(link: Path) -> Iterator[int]:
         os.set_blocking(ours, False)
         if link.is_symlink():
             link.unlink()  # left behind by an earlier run
-        link.symlink_to(os.ttyname(theirs))
+        try:
+            link.symlink_to(os.ttyname(theirs))
+        except OSError as error:  # it names the terminal, which nobody asked for
+            raise type(error)(error.errno, error.strerror, str(link)) from error
         try:
             yield ours
         finally:

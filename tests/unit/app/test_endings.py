@@ -60,6 +60,9 @@ def test_an_error_of_the_system_is_told_by_file_and_words_without_its_number():
         ("--sim run", "expected --sim without a command"),
         ("run --fast", "no such option '--fast'"),
         ("swim", "no such command 'swim'"),
+        ("--sim --seed -1", "--seed: expected a whole number from 0 on, got -1"),
+        ("--sim --seed x", "--seed: expected a whole number from 0 on, got 'x'"),
+        ("simulate nope", "{thermodaq}: expected one of thermodaq, got 'nope'"),
         (
             "reproduce",
             "expected a command, one of ozbek2021, bicer2017, lainiotis, experiment; see",
