@@ -162,12 +162,15 @@ def set_command(
 
 
 @click.command(epilog=examples("thermoctl mode auto", "thermoctl mode off --loop tank"))
-@click.argument("mode", metavar="off|manual|auto", type=Parsed("mode", _mode))
+@click.argument("mode", metavar="MODE", type=Parsed("mode", _mode))
 @loop_option
 @socket_option
 @json_option
 def mode(mode: str, loop: str | None, socket: Path | None, as_json: bool) -> None:
-    """Switch off, hand the power to the operator, or to the controller."""
+    """Switch off, hand the power to the operator, or to the controller.
+
+    MODE is off, manual or auto.
+    """
     told = _asked(socket, "mode", loop=loop, mode=mode)
     _tell(told, as_json, lambda: f"mode {told['mode']}")
 
