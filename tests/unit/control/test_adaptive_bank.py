@@ -212,7 +212,7 @@ def test_when_the_heat_has_arrived_gain_and_loss_are_uncertain_together():
     assert np.array_equal(block[~changed], before[~changed])
     assert np.array_equal(block[..., ~due], before[..., ~due])
     added = block[D, D] - before[D, D]
-    assert added[due] == pytest.approx((0.15 * (heat * before[BETA, X])[due]) ** 2)
+    assert added[due] == pytest.approx((0.08 * (heat * before[BETA, X])[due]) ** 2)
     difference, known = (P[D, D] - 2.0 * P[D, BETA] + P[BETA, BETA] for P in (block, before))
     assert difference == pytest.approx(known, rel=1e-6)
 

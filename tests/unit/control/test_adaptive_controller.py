@@ -272,11 +272,13 @@ def test_temperatures_have_no_zero():
 
 @pytest.mark.slow
 def test_six_quiet_hours_leave_the_gain_where_it_was_learnt():
-    law, vessel = Adaptive(), Vessel(noise_k=0.02)
-    belief, _ = steered(law, vessel, 6 * 3600)
-    plant = law.plant(belief)
-    assert plant.gain_k_per_s == pytest.approx(0.036, abs=0.001)
-    assert 0.001 < plant.gain_sd_k_per_s < 0.003
+    law = Adaptive()
+    early, late = (
+        law.plant(steered(law, Vessel(noise_k=0.02), seconds)[0]) for seconds in (1200, 6 * 3600)
+    )
+    assert late.gain_k_per_s == pytest.approx(early.gain_k_per_s, abs=0.001)
+    assert late.gain_k_per_s == pytest.approx(0.036, abs=2.0 * late.gain_sd_k_per_s)
+    assert late.gain_sd_k_per_s < 0.003
 
 
 @pytest.mark.parametrize("first_c", [85.0, 0.0, -40.0])

@@ -46,7 +46,7 @@ class Filter:
         self.x = F @ self.x
         self.P = F @ self.P @ F.T + self.h * np.diag(noise)
         if t_s - self.h <= 2 * self.lag_s < t_s:
-            ridge = np.array([0, 0, 1, 1]) * 0.15 * self.x[3] * self.q
+            ridge = np.array([0, 0, 1, 1]) * 0.08 * self.x[3] * self.q
             self.P = self.P + np.outer(ridge, ridge)
 
     def inflate(self, nu, R):

@@ -37,7 +37,7 @@ DRIFT_T, DRIFT_D, DRIFT_BETA = 0.08, 0.0008, 2e-4
 UNREST = 5.0
 """The noise of d grows by this share for every full range between power and holding power: water on
 its way to another temperature, glass and air behind it, loses what it did not lose before."""
-LOSS_LAGS, LOSS_SHARE = 2.0, 0.15
+LOSS_LAGS, LOSS_SHARE = 2.0, 0.08
 """After so many lags the heat has arrived, and the gain is known well enough to say how large a
 loss may be: this share of it is the standard deviation that `loosened` adds."""
 DRIFT_Z_K = 0.003
