@@ -23,13 +23,25 @@ pytestmark = pytest.mark.slow  # together more than the quick subset can afford
 COLD, WARM, HOT, OPEN = 600.0, 634.0, 690.0, 1023.0
 """Counts of 1024 at 5 V: 19.8, 36.4 and 63.8 degC, and no sensor."""
 
+COUNTS_PER_K = 0.010 / 5.0 * 1024.0
+
 TABLE = {"setpoint_c": 37.5, "trip_above_c": 60.0, "setpoint_min_c": 5.0}
 
 
-def on_script(reads, writes=(None,), duration_s=400.0, watch=None, **keys):
+class HeatedBoard(ScriptedBoard):
+    """A board that shows water which full power warms by 50 mK/s and the room cools by 20."""
+
+    def read(self, deadline_s):
+        self._reads[0] += COUNTS_PER_K * (0.05 * self.power - 0.02)
+        return super().read(deadline_s)
+
+
+def on_script(
+    reads, writes=(None,), duration_s=400.0, watch=None, kind_of_board=ScriptedBoard, **keys
+):
     """A trial of a loop on a scripted board, and that board."""
     clock = ManualClock()
-    board = ScriptedBoard(clock, reads=reads, writes=writes)
+    board = kind_of_board(clock, reads=reads, writes=writes)
     settings = alone(load({"loops": {"tank": TABLE | keys}}), "tank")
 
     def build(publish):
@@ -89,7 +101,7 @@ def given_powers(board):
 
 
 def test_a_run_to_its_end_gives_both_powers_and_ends_off():
-    trial, board = on_script([WARM])
+    trial, board = on_script([WARM], kind_of_board=HeatedBoard)
     outcome = trial.run()
     assert outcome.ending is Ending.FINISHED
     assert outcome.off_confirmed
