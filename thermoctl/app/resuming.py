@@ -65,7 +65,12 @@ class Resumption:
         if record is None:
             return table.mode, table.setpoint_c
         setpoint_c = _setpoint(record, table)
-        if record.configured_mode not in (None, table.mode):
+        edited = record.configured_mode not in (None, table.mode)
+        if (edited or table.resume) and setpoint_c != table.setpoint_c:
+            self._emit(
+                "setpoint.resumed", name, setpoint_c=setpoint_c, configured_c=table.setpoint_c
+            )
+        if edited:
             return table.mode, setpoint_c
         if table.resume:
             return Mode.OFF if record.mode is Mode.PROGRAM else record.mode, setpoint_c

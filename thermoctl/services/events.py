@@ -101,6 +101,7 @@ _BY_LEVEL: Final = {
         "plant.changed",
         "request.refused",
         "setpoint.changed",
+        "setpoint.resumed",
         "shadow.changed",
         "sim.disturbed",
         "socket.opened",

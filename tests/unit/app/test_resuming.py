@@ -60,6 +60,15 @@ def test_with_resume_it_goes_on_as_the_operator_left_it(starts):
     assert starts.start(resume=True) == (Mode.MANUAL, 41.0)
 
 
+def test_a_set_point_that_is_not_the_configured_one_is_told(starts):
+    starts.start(then=Seen(Mode.AUTO, 41.0), resume=True)
+    assert starts.told == []
+    starts.start(resume=True)
+    assert starts.told == ["setpoint.resumed"]
+    starts.start(resume=True, setpoint_c=35.0)
+    assert starts.told == ["setpoint.resumed"]
+
+
 def test_a_start_that_only_stayed_off_is_no_wish_to_be_off(starts):
     starts.start()
     starts.start()

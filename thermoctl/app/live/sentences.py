@@ -94,6 +94,10 @@ _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
         ("Set point out of reach: {text}", "Set point out of reach"),
     ),
     "setpoint.changed": (Mark.NONE, ("Set point {after_c}, was {before_c}", "Set point changed")),
+    "setpoint.resumed": (
+        Mark.NONE,
+        ("Set point {setpoint_c} as before, {configured_c} is configured", "Set point as before"),
+    ),
     "shadow.failed": (
         Mark.WARNING,
         ("Shadow {controller} failed and was dropped: {text}", "Shadow failed and was dropped"),
