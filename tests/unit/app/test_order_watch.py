@@ -56,6 +56,7 @@ def test_an_order_is_found_once_the_input_was_heard():
     assert watch.finding.probability >= 0.95
 
 
+@pytest.mark.slow
 def test_an_order_that_changes_is_told():
     run = cycles(2000)
     later = [

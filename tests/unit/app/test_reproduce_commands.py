@@ -244,6 +244,7 @@ def test_a_terminal_sees_how_far_it_is_on_stderr_alone(reproduce, monkeypatch):
 # -- the studies themselves ------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_study_of_o21_ends_in_table_page_and_json(reproduce, tmp_path):
     code, out, _ = reproduce("ozbek2021", "--replications", 5, "--json")
     told = json.loads(out)

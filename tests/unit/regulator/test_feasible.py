@@ -46,6 +46,7 @@ def codes(step):
     return [alarm.code for alarm in step.alarms if alarm.active]
 
 
+@pytest.mark.slow
 def test_fifty_watts_in_twenty_litres_are_told_from_a_cold_start():
     tank = Tank(20.0, 50.0, 2.0, period_s=10.0)
     step = tank.run(3 * 3600)

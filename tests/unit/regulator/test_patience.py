@@ -241,6 +241,7 @@ def test_manual_power_may_be_lowered_while_a_reading_is_missing_but_not_raised(w
     assert warm.step(Quality.MISSING).command.power == 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value_c", [0.0, 60.0])
 def test_a_set_point_on_the_limit_itself_is_held_or_latched_never_beyond(drive_with, value_c):
     drive = drive_with(water_c=30.0, controller=PAPER)

@@ -43,6 +43,7 @@ def test_an_open_circuit_three_times_in_ten_minutes_latches(warm):
     assert [alarm.code for alarm in latched.alarms if alarm.latched] == ["sensor.open"]
 
 
+@pytest.mark.slow
 def test_an_open_circuit_three_times_in_half_an_hour_does_not_latch(warm):
     for _ in range(3):
         warm.run(2, Quality.OPEN)

@@ -296,6 +296,7 @@ def test_the_paper_s_law_and_the_default_take_over_from_each_other_without_a_bum
         assert max(abs(step.measurement.temperature_c - 37.5) for step in drive.steps[-400:]) < 0.05
 
 
+@pytest.mark.slow
 def test_after_an_hour_of_full_power_by_hand_neither_has_wound_up(drive_with):
     drive = drive_with(water_c=20.0, mode="manual", controller=PAPER, shadow="adaptive")
     drive.regulator.request(ManualPower(1.0))

@@ -106,6 +106,7 @@ def test_nothing_uncertain_is_shown_as_certain(probability, shown):
     assert percent(probability) == shown
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("b", [1.0, 0.0])
 def test_a_figure_has_a_panel_more_when_orders_were_weighed(tmp_path, monkeypatch, b):
     monkeypatch.setitem(house._STYLE, "savefig.dpi", 40.0)

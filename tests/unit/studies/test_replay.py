@@ -40,6 +40,7 @@ def only(result):
     return score
 
 
+@pytest.mark.slow
 def test_true_parameters_lie_within_their_error_bars():
     misses = []
     for seed in range(20):
