@@ -25,6 +25,7 @@ from thermoctl.app.options import (
     state_option,
 )
 from thermoctl.app.order_options import candidates_option, require_auto
+from thermoctl.app.parts import plan_for
 from thermoctl.app.results import make_folder, print_json, say
 from thermoctl.app.settings import Settings, default_files, load_all
 from thermoctl.app.sim import bench_settings, default_profile, stand_ins
@@ -192,8 +193,9 @@ def _settings(asked: _Asked) -> Settings:
 
 def _planned(settings: Settings, asked: _Asked) -> tuple[str, Excitation]:
     """Return the loop and the test signal; a signal it has no room for is wrong usage."""
-    name, _ = settings.loop(asked.loop)
+    name, table = settings.loop(asked.loop)
     try:
+        _require_heater(name, table)
         if asked.duration_s > LONGEST_S:
             raise ConfigError(f"expected at most {duration(LONGEST_S)}, got {asked.duration_s:g} s")
         excitation = plan(settings, name, asked.powers, asked.band_k, asked.duration_s, asked.seed)
@@ -206,6 +208,17 @@ def _planned(settings: Settings, asked: _Asked) -> tuple[str, Excitation]:
         return name, excitation
     except ConfigError as problem:
         raise click.UsageError(str(problem), click.get_current_context()) from problem
+
+
+def _require_heater(name: str, table: LoopTable) -> None:
+    """Raise `ConfigError` for a loop that cannot be heated to a band: nothing would be learnt."""
+    if table.leads is not None:
+        raise ConfigError(
+            f"expected a loop with a heater of its own, got {name!r}, which leads"
+            f" {table.leads.loop!r}"
+        )
+    if plan_for(table).limits.power_cools:
+        raise ConfigError(f"expected a loop that heats, got {name!r}, which only cools")
 
 
 def _consent(settings: Settings, name: str, excitation: Excitation, asked: _Asked) -> None:

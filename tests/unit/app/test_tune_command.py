@@ -269,3 +269,21 @@ def test_a_trip_that_the_sensor_could_not_show_is_not_suggested():
     fine = Proposal("power_max", 0.5, 1.0, True, "made")
     board = Proposal("dead_man_s", 2.5, 60.0, True, "made")
     assert limit_keys(loop, [beyond, fine, board]) == {"power_max": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("profile", "told"),
+    [
+        ("cool", "expected a loop that heats, got 'tank', which only cools"),
+        (
+            "cascade",
+            "expected a loop with a heater of its own, got 'bath', which leads 'block'",
+        ),
+    ],
+)
+def test_a_loop_that_cannot_be_heated_to_a_band_is_refused(profile, told):
+    config = Path(__file__).parents[3] / "config" / f"{profile}.toml"
+    code, out, said = run("--sim", "-c", config)
+    assert (code, out) == (2, "")
+    assert told in said
+    assert not Path("tune").exists()
