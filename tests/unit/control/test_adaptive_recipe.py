@@ -57,7 +57,7 @@ class Filter:
     def correct(self, y, R, u_min, limit_loss, e):
         S, nu = self.P[1, 1] + R, y - self.x[1]
         K = self.P[:, 1] / S
-        K[3] *= e if self.P[3, 3] <= (0.2 * self.x[3]) ** 2 else 1.0
+        K[3] *= e if self.P[3, 3] <= (0.1 * self.x[3]) ** 2 else 1.0
         self.x = self.x + K * nu
         A = np.eye(4) - np.outer(K, [0, 1, 0, 0])
         self.P = A @ self.P @ A.T + R * np.outer(K, K)

@@ -45,7 +45,7 @@ DRIFT_Z_K = 0.003
 DRIFT_GAIN_MIN = 1e-4
 """The shares are of no smaller gain than this, in K/s."""
 
-KNOWN_SHARE = 0.2
+KNOWN_SHARE = 0.1
 """A gain is known once its standard deviation is at most this share of it."""
 
 GAIN_MIN, GAIN_MAX = 2e-5, 0.5
