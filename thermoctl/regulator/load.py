@@ -29,9 +29,10 @@ class KnownLoad:
         self._power = 0.0
         self._begin_s = self._end_s = -math.inf
         self._told = False
+        self._wanted: tuple[float, float] | None = None
 
-    def want(self, power: float, duration_s: float, t_s: float) -> None:
-        """Expect `power`, a fraction of full power, for `duration_s` from `t_s` on.
+    def want(self, power: float, duration_s: float) -> None:
+        """Expect `power`, a fraction of full power, for `duration_s` from the next sample on.
 
         Raises
         ------
@@ -44,12 +45,15 @@ class KnownLoad:
             raise Refused(
                 f"expected a duration above 0, up to {LONGEST_S:.0f} s, got {duration_s!r}"
             )
-        self._power, self._begin_s, self._end_s = float(power), t_s, t_s + float(duration_s)
-        self._told = True
-        self._emit("load.changed", power=self._power, duration_s=float(duration_s))
+        self._wanted = float(power), float(duration_s)
+        self._emit("load.changed", power=float(power), duration_s=float(duration_s))
 
     def at(self, t_s: float) -> float:
-        """Return the load from `t_s` on."""
+        """Return the load from `t_s` on; one that was wanted begins."""
+        if self._wanted is not None:
+            self._power, duration_s = self._wanted
+            self._begin_s, self._end_s = t_s, t_s + duration_s
+            self._wanted, self._told = None, True
         if t_s >= self._end_s and self._told:
             self._told = False
             self._emit("load.changed", power=0.0, duration_s=0.0)

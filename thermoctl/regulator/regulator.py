@@ -125,7 +125,7 @@ class Regulator:
             case ManualPower(power):
                 self._wishes.want_power(power)
             case Load(power, duration_s):
-                self._load.want(power, duration_s, self._t_s or 0.0)
+                self._load.want(power, duration_s)
             case ChooseController(name):
                 self._choose(name)
             case ChooseShadow(law):

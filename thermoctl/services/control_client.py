@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
-from thermoctl.errors import NotPermitted, NotRunning, Refused, Unavailable
+from thermoctl.errors import NotPermitted, NotRunning, Refused, ThermoctlError, Unavailable
 from thermoctl.services.control_place import checked, usual_paths
 from thermoctl.services.control_protocol import VERSION, asking, error_words
 
@@ -19,6 +19,8 @@ ANSWER_S: Final = 5.0
 """How long a reply may take that needs no cycle of the loop."""
 
 _PAUSE_S: Final = 0.02
+_HARMLESS: Final = ("status", "get", "alarms")
+"""Calls that change nothing, and may be made twice."""
 
 
 class ControlClient:
@@ -38,9 +40,13 @@ class ControlClient:
     """
 
     def __init__(self, path: Path | None = None) -> None:
-        self._connection = _connected(usual_paths() if path is None else [checked(path)])
-        self._lines = self._connection.makefile("rb")
+        self._paths = usual_paths() if path is None else [checked(path)]
+        self._connect()
         self._calls = 0
+
+    def _connect(self) -> None:
+        self._connection = _connected(self._paths)
+        self._lines = self._connection.makefile("rb")
 
     def __enter__(self) -> Self:
         return self
@@ -61,6 +67,9 @@ class ControlClient:
     def ask(self, do: str, patience_s: float = ANSWER_S, **keys: Any) -> Mapping[str, Any]:
         """Return the content of the reply to a call.
 
+        A busy daemon may drop a client it has not heard yet; what changes nothing is then asked a
+        second time.
+
         Parameters
         ----------
         do : str
@@ -79,6 +88,19 @@ class ControlClient:
         Unavailable
             No reply in time, or none that can be understood.
         """
+        try:
+            return self._asked(do, patience_s, keys)
+        except NotRunning as gone:
+            if do not in _HARMLESS:
+                raise
+            self.close()
+            try:
+                self._connect()
+            except ThermoctlError:
+                raise gone from None
+            return self._asked(do, patience_s, keys)
+
+    def _asked(self, do: str, patience_s: float, keys: Mapping[str, Any]) -> Mapping[str, Any]:
         self._calls += 1
         self._connection.settimeout(patience_s)
         try:
