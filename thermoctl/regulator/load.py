@@ -32,7 +32,7 @@ class KnownLoad:
         self._wanted: tuple[float, float] | None = None
 
     def want(self, power: float, duration_s: float) -> None:
-        """Expect `power`, a fraction of full power, for `duration_s` from the next sample on.
+        """Expect `power`, of full power, for `duration_s` from the next sample on.
 
         Raises
         ------
