@@ -69,6 +69,9 @@ def steered_by_the_paper(profile):
     return load(document)
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module", params=SCENARIOS, ids=lambda scenario: scenario.name)
 def played(request):
     """Return a scenario with the times, deviations, powers and states it produced."""

@@ -40,6 +40,8 @@ board = "daq"
 board = "daq"
 """
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def places(tmp_path, monkeypatch):
