@@ -65,7 +65,7 @@ def approaches():
     yield pytest.param(SEEN_LATE, 50.0, marks=pytest.mark.xfail(reason="overshoots by .53 K"))
 
 
-@pytest.mark.parametrize(("vessel", "setpoint_c"), approaches())
+@pytest.mark.parametrize(("vessel", "setpoint_c"), list(approaches()))
 def test_a_fast_vessel_comes_to_rest_at_its_set_point(vessel, setpoint_c):
     cycles = play(vessel, 2400, setpoint_c=setpoint_c)
     truth = np.array([each.truth["true_temperature_c"] for each in cycles])
