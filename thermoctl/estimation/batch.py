@@ -14,14 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from thermoctl.estimation.belief import LARGEST, floats, frozen, start
+from thermoctl.estimation.batch_one import run_one
+from thermoctl.estimation.belief import LARGEST, floats, frozen, sane, start
+from thermoctl.estimation.kalman import CorrectedKalman
 from thermoctl.estimation.recursion import ARRAYS, RecursiveLaw, drift
 from thermoctl.estimation.stack import stack
 from thermoctl.quantities import Array
 from thermoctl.signals import Estimate
-
-SANE = 1e10
-"""A run that stays within this rejected nothing, and need not be looked at sample by sample."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,8 +83,8 @@ def run_batch(
     belief = start(phi.shape[2], P0, theta0)
     columns = np.ascontiguousarray(np.moveaxis(phi, 1, 2))
     with np.errstate(all="ignore"):  # what overflows here is found in the result
-        block, sane = _run(law, y, columns, belief, careful=not _sane(columns))
-        if not sane:
+        block, well = _run(law, y, columns, belief, careful=False)
+        if not well:
             block, _ = _run(law, y, columns, belief, careful=True)
     return _unpacked(block, phi.shape[2])
 
@@ -101,6 +100,10 @@ def _run(
     # One block for everything: numpy asks for huge pages from 4 MB on, and page faults would
     # otherwise cost as much as the arithmetic (benchmarks/estimators.py: 13 and 8 ms).
     block = np.empty((T, (n + 1) * n + 2, R))
+    if not careful and n == 1 and isinstance(law, CorrectedKalman) and not np.any(law.R1):
+        return block, run_one(law, y, phi[:, 0], belief, block)
+    if not (careful or sane(phi)):
+        return block, False
     rows, innovation, inflation = _rows(block, n), block[:, -2], block[:, -1]
     R1 = drift(law.R1, n)[:, :, None] if np.any(law.R1) else None
     before: tuple[Array, ...] = (
@@ -115,7 +118,7 @@ def _run(
             unusable = ~usable(phi[t], S, *after[:2])
             for new, old in zip(after, before, strict=True):
                 np.copyto(new, old, where=unusable)
-        elif not _sane(block[t]):
+        elif not sane(block[t]):
             return block, False
         before = after
     return block, True
@@ -182,9 +185,3 @@ def _dot(a: Array, b: Array) -> Array:
     for j in range(1, len(b)):
         total = total + a[j] * b[j]
     return total
-
-
-def _sane(values: Array) -> bool:
-    """Return whether all are far from what `update` rejects; false for NaN."""
-    flat = values.ravel()  # one pass for the sum of squares; the extremes would take two
-    return bool(flat.dot(flat) < SANE * SANE)

@@ -17,6 +17,9 @@ LARGEST = 1e50
 It is beyond every meaning, and within it no product in this room can overflow.
 """
 
+SANE = 1e10
+"""What stays within this was rejected nowhere, and need not be looked at sample by sample."""
+
 SHOWN = 200
 """Characters of a refused value that a message repeats."""
 
@@ -159,3 +162,9 @@ def _parameters(name: str, value: npt.ArrayLike | None, n: int) -> Array:
     if theta.shape != (n,):
         raise ValueError(f"{name} must have shape ({n},), got {theta.shape}")
     return frozen(theta)
+
+
+def sane(values: Array) -> bool:
+    """Return whether all `values` lie within `SANE`; false for NaN."""
+    flat = values.ravel()  # one pass for the sum of squares; the extremes would take two
+    return bool(flat.dot(flat) < SANE * SANE)
