@@ -21,7 +21,7 @@ STRIDE = 8
 
 
 def run_one(law: CorrectedKalman, y: Array, phi: Array, belief: Estimate, block: Array) -> bool:
-    """Fill `block` with theta, P, e and the inflation; return whether all is sane.
+    """Fill `block` with theta, P, e and inflation; return whether all is sane.
 
     Parameters
     ----------
