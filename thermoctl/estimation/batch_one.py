@@ -1,8 +1,8 @@
 """Many replications of a filter with one parameter that does not drift.
 
-That is the study of O21. With one parameter and R1 = 0 the information ``i = R2/P`` is a number that
-only gains, and P need not be divided at every turn. That leaves eleven array operations to a sample,
-half of what `thermoctl.estimation.batch.advance` takes for any number of parameters.
+That is the study of O21. With one parameter and R1 = 0 the information ``i = R2/P`` is a number
+that only gains, and P need not be divided at every turn. That leaves eleven array operations to a
+sample, half of what `thermoctl.estimation.batch.advance` takes for any number of parameters.
 
 Implements section 2 of ``docs/theory.md``.
 """

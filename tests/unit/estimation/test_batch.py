@@ -10,6 +10,7 @@ from thermoctl.estimation import (
     RecursiveLeastSquares,
     VariableForgetting,
     run_batch,
+    start,
 )
 
 POLE = np.concatenate((np.full(100, -0.9), np.full(100, 0.9), np.full(200, -0.9)))
@@ -149,3 +150,20 @@ def test_a_covariance_that_would_overflow_is_refused_in_one_replication_only():
 def test_a_run_of_no_samples_is_empty():
     run = run_batch(CorrectedKalman(), np.zeros((0, 2)), np.zeros((0, 2, 1)))
     assert run.theta.shape == (0, 2, 1)
+
+
+@pytest.mark.parametrize("T", [1, 7, 8, 9, 40])
+@pytest.mark.parametrize("law", [CorrectedKalman(R2=0.3), CorrectedKalman(R2=0.3, inflation_max=2)])
+def test_a_batch_of_one_parameter_is_the_loop_however_long_it_is(law, T):
+    rng = np.random.default_rng(5)
+    phi = rng.normal(size=(T, 3, 1))
+    y = np.where(np.arange(T) < 20, 0.5, -3.0)[:, None] * phi[:, :, 0] + rng.normal(size=(T, 3))
+    run = run_batch(law, y, phi, P0=2.0, theta0=[0.4])
+    for r in range(3):
+        belief = start(1, 2.0, [0.4])
+        for t in range(T):
+            belief = law.update(belief, phi[t, r], y[t, r])
+            assert run.theta[t, r] == pytest.approx(belief.theta, rel=1e-10)
+            assert run.P[t, r] == pytest.approx(belief.P, rel=1e-10)
+            assert run.innovation[t, r] == pytest.approx(belief.innovation, rel=1e-10)
+            assert run.inflation[t, r] == pytest.approx(belief.inflation, rel=1e-10)
