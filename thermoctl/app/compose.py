@@ -26,8 +26,8 @@ from thermoctl.model.actuator import Linear
 from thermoctl.ports import Board, Clock, Remembered
 from thermoctl.regulator import Regulator
 from thermoctl.regulator.recollection import NOTHING
-from thermoctl.runtime.cascade import Lead
 from thermoctl.runtime.connection import Connection
+from thermoctl.runtime.lead import Lead
 from thermoctl.runtime.loop import Loop, Publish
 from thermoctl.runtime.wiring import Input, Output, Wiring
 from thermoctl.signals import Alarm, Mode

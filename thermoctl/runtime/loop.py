@@ -19,8 +19,9 @@ from thermoctl.errors import DriverError, FaultError, LinkError, Refused
 from thermoctl.ports import Clock
 from thermoctl.regulator.limits import command_lasts_s
 from thermoctl.runtime.asked import Asked
-from thermoctl.runtime.cascade import Lead, hand_down, outer_first
+from thermoctl.runtime.cascade import hand_down, outer_first
 from thermoctl.runtime.connection import Connection
+from thermoctl.runtime.lead import Lead
 from thermoctl.runtime.wiring import Input, Output, Wiring, signed
 from thermoctl.signals import Cycle, Event, Measurement, Quality, RawSample, Request, Step
 

@@ -10,8 +10,8 @@ from thermoctl.model.actuator import ActuatorLaw
 from thermoctl.model.sensor import Sensor
 from thermoctl.quantities import is_finite_number
 from thermoctl.regulator import Regulator
-from thermoctl.runtime.cascade import Lead
 from thermoctl.runtime.connection import Connection
+from thermoctl.runtime.lead import Lead
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,8 @@ import pytest
 from thermoctl.app.compose import loop_for
 from thermoctl.app.settings import load
 from thermoctl.errors import Refused
-from thermoctl.runtime.cascade import Lead, outer_first
+from thermoctl.runtime.cascade import outer_first
+from thermoctl.runtime.lead import Lead
 from thermoctl.signals import ManualPower, Measurement, Mode, Quality, SetPoint, State
 from thermoctl.testing import ManualClock
 
