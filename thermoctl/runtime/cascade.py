@@ -1,4 +1,4 @@
-"""Loops that give other loops their set points: who comes first, and what is handed down."""
+"""Loops that give others their set points: who is first, and what is handed on."""
 
 from __future__ import annotations
 
