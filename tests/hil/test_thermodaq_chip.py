@@ -156,9 +156,18 @@ def test_the_sample_is_dated_to_the_middle_of_its_burst(chip: Chip) -> None:
         assert sample.full_scale == 1600 * 1024
 
 
-def closed_loop(seconds: int, chip: Chip) -> list[float]:
+PAPER = {
+    "controller": {"kind": "self-tuning-mv", "reference_time_s": 60.0},
+    "model": {"structure": "known-gain", "gain_k_per_s": 0.0449},
+    "estimator": {"kind": "ckf", "R2": 0.01},
+}
+
+
+def closed_loop(
+    seconds: int, chip: Chip, initial_c: float = 35.5, law: dict[str, object] = PAPER
+) -> list[float]:
     """Return the true temperatures of the rig held at 37.5 degC by the daemon's own regulator."""
-    tank = TankParameters(initial_c=35.5)
+    tank = TankParameters(initial_c=initial_c)
     device = wired(chip, tank, seed=3)
     board, clock = rig(device)
     configuration = {
@@ -170,12 +179,7 @@ def closed_loop(seconds: int, chip: Chip) -> list[float]:
                 "mode": "auto",
                 "sensor": {"board": "daq", "input": "temperature"},
                 "actuator": {"board": "daq", "output": "heater"},
-                "controller": {"kind": "self-tuning-mv", "reference_time_s": 60.0},
-                "model": {
-                    "structure": "known-gain",
-                    "gain_k_per_s": 0.0449,
-                },
-                "estimator": {"kind": "ckf", "R2": 0.01},
+                **law,
             }
         },
     }
@@ -208,6 +212,23 @@ def test_the_driver_holds_a_tank_through_the_firmware(
         )
     assert max(trajectory) < 38.3
     assert abs(sum(last) / len(last) - 37.5) < 0.4
+
+
+@pytest.mark.slow
+def test_the_default_law_warms_a_tank_up_through_the_firmware(
+    chip: Chip, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trajectory = closed_loop(600, chip, initial_c=25.0, law={})
+    rest_c = sum(trajectory[-60:]) / 60
+    late = [second for second, c in enumerate(trajectory, 1) if abs(c - rest_c) > 0.1]
+    with capsys.disabled():
+        print(
+            f"\nwarm-up through the firmware from 25 degC: within 0.1 K of {rest_c:.2f} degC after "
+            f"{late[-1] + 1} s, {max(trajectory) - rest_c:.3f} K past it"
+        )
+    assert abs(rest_c - 37.5) < 0.4  # what the sensor is off
+    assert max(trajectory) < rest_c + 0.1
+    assert late[-1] < 450
 
 
 @pytest.mark.slow
