@@ -22,14 +22,15 @@ from thermoctl.app.settings import load
 from thermoctl.app.sim import WATER_J_PER_LK, profile
 from thermoctl.app.tables import LoopTable, Options
 from thermoctl.errors import ConfigError, Refused, Unavailable
+from thermoctl.plant.parameters import TankParameters
 from thermoctl.regulator import Plan
 from thermoctl.studies.compare.baselines import BASELINES, require
 from thermoctl.studies.compare.figure import MOST_DRAWN, draw_comparison
-from thermoctl.studies.compare.plants import FLEETS, Plant, plant
+from thermoctl.studies.compare.plants import FLEETS, Plant, Usage, plant
 from thermoctl.studies.compare.present import as_json as lines_as_json
 from thermoctl.studies.compare.present import print_table
 from thermoctl.studies.compare.run import Contender, Job, finished, jobs_for
-from thermoctl.studies.compare.scenarios import HELD_C, SCENARIOS, SETPOINT
+from thermoctl.studies.compare.scenarios import SCENARIOS, SETPOINT
 from thermoctl.studies.compare.store import Result, Store
 from thermoctl.studies.compare.summary import Line, summarise
 from thermoctl.studies.figure import FORMATS
@@ -46,7 +47,9 @@ def known_kinds() -> tuple[str, ...]:
     return tuple(sorted({*plugins.kinds(plugins.CONTROLLERS), *BASELINES}))
 
 
-def contender(text: str, table: LoopTable, *, nameplate: bool = False) -> Contender:
+def contender(
+    text: str, table: LoopTable, *, nameplate: bool = False, fitted: bool = True
+) -> Contender:
     """Return the controller of `text`: a kind, or ``kind:option=value,...``.
 
     Values are written as in TOML.
@@ -59,6 +62,8 @@ def contender(text: str, table: LoopTable, *, nameplate: bool = False) -> Conten
         The loop it works in: limits, model, estimator and period.
     nameplate : bool
         Tell the model of every loop the gain that litres and watts of its plant make.
+    fitted : bool
+        Give a loop the limits and the gain that its fleet is used with, where it has some.
 
     Raises
     ------
@@ -75,9 +80,11 @@ def contender(text: str, table: LoopTable, *, nameplate: bool = False) -> Conten
     options = _options(text, rest)
     law = Options.model_validate({"kind": kind, **options})
     own = table.model_copy(update={"controller": law, "shadow": None})
-    build = partial(_plan, own, nameplate=nameplate)
+    build = partial(_plan, own, nameplate=nameplate, fitted=fitted)
     build(plant("rig", 0))  # so that a bad option is told before anything is run
-    identity = json.dumps([own.model_dump(mode="json"), nameplate, _origin(kind)], sort_keys=True)
+    identity = json.dumps(
+        [own.model_dump(mode="json"), nameplate, fitted, _origin(kind)], sort_keys=True
+    )
     return Contender(text, identity, build, table.period_s)
 
 
@@ -96,19 +103,37 @@ def _origin(kind: str) -> str:
     return "" if package is None else f"{package.name} {package.version}"
 
 
-def _plan(table: LoopTable, where: Plant, *, nameplate: bool) -> Plan:
+def _plan(table: LoopTable, where: Plant, *, nameplate: bool, fitted: bool) -> Plan:
     """Return the parts of a regulator for one plant."""
-    if nameplate:
-        tank = where.parameters
-        gain = tank.element.rated_w / (WATER_J_PER_LK * tank.vessel.volume_l)
-        model = table.model.model_copy(update={"gain_k_per_s": gain})
-        table = table.model_copy(update={"model": model})
+    if fitted:
+        table = _fitted(table, where.usage)
+    tank = where.parameters
+    if nameplate and isinstance(tank, TankParameters):
+        table = _told(table, tank.element.rated_w / (WATER_J_PER_LK * tank.vessel.volume_l))
     kind = table.controller.kind
     if kind not in BASELINES:
         return plan_for(table)
     law = plugins.build(BASELINES[kind], table.controller.options)
     stand_in = table.model_copy(update={"controller": Options(kind="on-off"), "shadow": None})
     return replace(plan_for(stand_in), controller=law)
+
+
+def _fitted(table: LoopTable, usage: Usage) -> LoopTable:
+    """Return the loop as `usage` has it; what that leaves open is as it was."""
+    own = {
+        "setpoint_c": usage.held_c,
+        "setpoint_max_c": usage.setpoint_max_c,
+        "trip_above_c": usage.trip_above_c,
+        "heater_w": usage.heater_w,
+    }
+    table = table.model_copy(update={name: each for name, each in own.items() if each is not None})
+    return table if usage.gain_k_per_s is None else _told(table, usage.gain_k_per_s)
+
+
+def _told(table: LoopTable, gain_k_per_s: float) -> LoopTable:
+    """Return the loop with a model that is told its gain."""
+    model = table.model.model_copy(update={"gain_k_per_s": gain_k_per_s})
+    return table.model_copy(update={"model": model})
 
 
 def _name(what: str, known: Sequence[str]) -> Parsed:
@@ -142,7 +167,8 @@ def _name(what: str, known: Sequence[str]) -> Parsed:
     "--config",
     type=FILE,
     metavar="FILE",
-    help="Where limits, model and estimator come from; the aquarium when not given.",
+    help="Where limits, model and estimator come from; the aquarium when not given, with the "
+    "limits and the gain of a lab for a lab.",
 )
 @click.option(
     "--fleet",
@@ -200,7 +226,7 @@ def compare(
     if quick and seeds is not None:
         raise click.UsageError("expected --quick or --seeds, got both")
     count = seeds or (_QUICK_SEEDS if quick else _SEEDS)
-    contenders = _contenders(texts, config, nameplate=nameplate)
+    contenders = _contenders(texts, config, fleets, nameplate=nameplate)
     names = list(dict.fromkeys(each.name for each in contenders))
     planned = jobs_for(contenders, dict.fromkeys(fleets), range(count), scenarios)
     if not planned:
@@ -217,35 +243,41 @@ def compare(
         print_table(console(), lines, names)
 
 
-def _contenders(texts: Sequence[str], config: Path | None, *, nameplate: bool) -> list[Contender]:
+def _contenders(
+    texts: Sequence[str], config: Path | None, fleets: Sequence[str], *, nameplate: bool
+) -> list[Contender]:
     """Return who takes part; say who is missing of the usual ones."""
     _, table = load(config or profile("aquarium")).loop()
-    _check_setpoints(table)
+    fitted = config is None
+    for fleet in dict.fromkeys(fleets):
+        _check_setpoints(table, fleet, fitted=fitted)
+    made = partial(contender, table=table, nameplate=nameplate, fitted=fitted)
     if texts:
-        return [contender(text, table, nameplate=nameplate) for text in dict.fromkeys(texts)]
+        return [made(text) for text in dict.fromkeys(texts)]
     there = []
     for text in USUAL:
         try:
             if text.partition(":")[0] not in known_kinds():
                 raise Unavailable(f"no controller {text} is installed")
-            there.append(contender(text, table, nameplate=nameplate))
+            there.append(made(text))
         except Unavailable as missing:
             say([f"{missing}; it is left out"])
     return there
 
 
-def _check_setpoints(table: LoopTable) -> None:
-    """Refuse a loop in which the scenarios' set points may not be asked for."""
+def _check_setpoints(table: LoopTable, fleet: str, *, fitted: bool) -> None:
+    """Refuse a loop in which the set points of a fleet's scenarios may not be asked for."""
+    usage = FLEETS[fleet].usage
     steps = [
         each.amount or 0.0
-        for scenario in SCENARIOS.values()
-        for each in scenario.happenings
+        for name in FLEETS[fleet].scenarios
+        for each in SCENARIOS[name].happenings
         if each.name == SETPOINT
     ]
-    limits = plan_for(table).limits
+    limits = plan_for(_fitted(table, usage) if fitted else table).limits
     try:
         for step_k in (0.0, *steps):
-            limits.accept_setpoint(HELD_C + step_k)
+            limits.accept_setpoint(usage.held_c + step_k)
     except Refused as refusal:
         raise ConfigError(f"this loop cannot be compared: {refusal}") from refusal
 

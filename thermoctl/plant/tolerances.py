@@ -50,12 +50,12 @@ def specimen(parameters: TankParameters, rng: Generator, spread: float = 0.1) ->
     parts: dict[str, Any] = {}
     for part_name, names in VARIED.items():
         part: Any = getattr(parameters, part_name)
-        varied = {name: getattr(part, name) * _factor(rng, spread) for name in names}
+        varied = {name: getattr(part, name) * factor(rng, spread) for name in names}
         parts[part_name] = replace(part, **varied)
     return replace(parameters, **parts)
 
 
-def _factor(rng: Generator, spread: float) -> float:
-    """Return one log-normal factor within two standard deviations."""
+def factor(rng: Generator, spread: float) -> float:
+    """Return one log-normal factor of this spread, within two standard deviations."""
     deviation = min(max(float(rng.standard_normal()), -2.0), 2.0)
     return math.exp(spread * deviation)

@@ -70,8 +70,8 @@ def test_a_bad_controller_is_refused_with_what_was_expected(text, words):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--fleet", "navy"], "expected one of rig, sizes, lags, got 'navy'"),
-        (["--scenario", "flood"], "expected one of warm-up, .*half-gone, got 'flood'"),
+        (["--fleet", "navy"], "expected one of rig, sizes, lags, tclab, got 'navy'"),
+        (["--scenario", "flood"], "expected one of warm-up, .*second-heater, got 'flood'"),
         (["--quick", "--seeds", "3"], "--quick or --seeds"),
         (["--fleet", "sizes", "--scenario", "ice"], "expected a scenario of sizes"),
     ],

@@ -77,7 +77,7 @@ def test_a_tank_of_any_size_can_be_held_and_is_given_time(seed):
 
 
 def test_a_fleet_that_is_not_there_is_refused_with_those_that_are():
-    with pytest.raises(FleetError, match="rig, sizes, lags, got 'navy'"):
+    with pytest.raises(FleetError, match="rig, sizes, lags, tclab, got 'navy'"):
         plant("navy", 0)
 
 

@@ -62,7 +62,7 @@ def rest(parameters: TankParameters, target_c: float) -> Rest:
             return np.append(_rates(k, at, heater_w), off_k)
 
         residual = -drift(np.zeros(n))
-        change: Array = np.linalg.inv(_slope(drift, n)) @ residual
+        change: Array = np.linalg.inv(slope(drift, n)) @ residual
         heat, power = _moved(k, heat, change[:-1]), power + float(change[-1])
         if float(np.abs(change).max()) < 1e-9:
             return Rest(heat, power)
@@ -93,19 +93,24 @@ def linear_tank(
         Time between two samples.
     """
     steps = math.ceil(period_s / thermal.LONGEST_STEP_S)
-    A, B, Q = _step(parameters, at, period_s / steps)
-    whole_A, whole_B, whole_Q = np.eye(len(A)), np.zeros_like(B), np.zeros_like(Q)
-    for _ in range(steps):
-        whole_A, whole_B, whole_Q = A @ whole_A, A @ whole_B + B, A @ whole_Q @ A.T + Q
+    A, B, Q = over(steps, *_step(parameters, at, period_s / steps))
     share = parameters.vessel.still_share
     C, z = np.zeros((1, len(A))), np.zeros((1, len(A)))
     C[0, -1] = 1.0
     z[0, WATER], z[0, STILL] = 1.0 - share, share
-    return Linear(whole_A, whole_B, whole_Q, C, _reading_variance(acquisition), z)
+    return Linear(A, B, Q, C, reading_variance(acquisition), z)
 
 
-def _reading_variance(acquisition: AcquisitionParameters) -> float:
-    """Return the variance of a burst's mean in K²: white noise, and steps that are dithered."""
+def over(steps: int, A: Array, B: Array, Q: Array) -> tuple[Array, Array, Array]:
+    """Return transition, input and noise of equal steps with a constant input."""
+    whole_A, whole_B, whole_Q = np.eye(len(A)), np.zeros_like(B), np.zeros_like(Q)
+    for _ in range(steps):
+        whole_A, whole_B, whole_Q = A @ whole_A, A @ whole_B + B, A @ whole_Q @ A.T + Q
+    return whole_A, whole_B, whole_Q
+
+
+def reading_variance(acquisition: AcquisitionParameters) -> float:
+    """Return the variance of a burst's mean in K²: noise, and steps it dithers."""
     step_v = acquisition.reference_v / 2.0**acquisition.bits
     variance_v2 = acquisition.noise_v**2 + step_v**2 / 12.0
     return KELVIN_PER_V**2 * variance_v2 / acquisition.conversions
@@ -122,7 +127,7 @@ def _step(parameters: TankParameters, at: Rest, step_s: float) -> tuple[Array, A
         heat = _moved(k, at.heat, moved[:n])
         return _temperatures(k, thermal.step(k, heat, heater_w, 1.0 + moved[n + 1], step_s))
 
-    J = _slope(heat_after, n + 2)
+    J = slope(heat_after, n + 2)
     late, part = divmod(probe.transport_s / step_s, 1.0)
     taps = int(late) + 1
     mains, ice, eddy, tap, met, sheath = n, n + 1, n + 2, n + 3, n + 3 + taps, n + 4 + taps
@@ -152,7 +157,7 @@ def _step(parameters: TankParameters, at: Rest, step_s: float) -> tuple[Array, A
     return rows[:, :size], rows[:, size : size + 1], kicks @ kicks.T
 
 
-def _slope(function: Callable[[Array], Array], n: int) -> Array:
+def slope(function: Callable[[Array], Array], n: int) -> Array:
     """Return the Jacobian of `function` at 0 by central differences."""
     columns = []
     for place in range(n):

@@ -12,6 +12,7 @@ from numpy.random import Generator
 from thermoctl.errors import ThermoctlError
 from thermoctl.plant import thermal
 from thermoctl.plant.acquisition import AcquisitionParameters
+from thermoctl.plant.lab import LabParameters, lab_specimen
 from thermoctl.plant.parameters import WATER_J_PER_KG_K, TankParameters
 from thermoctl.plant.tolerances import specimen
 from thermoctl.studies.compare.linear import rest
@@ -21,7 +22,12 @@ TOLERANCES = 0.1
 """Spread between specimens of one order: 10 %."""
 
 ACQUISITION = AcquisitionParameters(bits=12)
-"""The converter of every plant: bursts of 32 conversions over two mains periods."""
+"""The converter of every tank: bursts of 32 conversions over two mains periods."""
+
+LAB_ACQUISITION = AcquisitionParameters(
+    bits=10, reference_v=5.0, conversions=10, burst_s=0.001, noise_v=2e-3, pickup_v=0.0
+)
+"""That of a lab: ten conversions at once, their mean a multiple of 49 mK that wanders by 77 mK."""
 
 PACE_S = 1200.0
 """What the rig takes to warm up and settle; the scenarios' times are counted in it."""
@@ -35,6 +41,27 @@ class FleetError(ThermoctlError, ValueError):
 
 
 @dataclass(frozen=True, slots=True)
+class Usage:
+    """What whoever has such a plant configures for it, from its data sheet alone.
+
+    Parameters
+    ----------
+    held_c : float
+        Set point that the scenarios begin with.
+    setpoint_max_c, trip_above_c : float or None
+        Highest set point, and the trip; None: as the configuration has them.
+    gain_k_per_s, heater_w : float or None
+        Rise at full power, and that power; None: as the configuration has them.
+    """
+
+    held_c: float = HELD_C
+    setpoint_max_c: float | None = None
+    trip_above_c: float | None = None
+    gain_k_per_s: float | None = None
+    heater_w: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Plant:
     """One member of a fleet.
 
@@ -44,22 +71,30 @@ class Plant:
         The fleet it belongs to.
     seed : int
         Which one it is; equal seeds give equal plants, mains, ice, turbulence and noise.
-    parameters : TankParameters
-        The tank.
+    parameters : TankParameters or LabParameters
+        The tank, or the lab.
     acquisition : AcquisitionParameters
         The converter.
     pace : float
         How many times slower than the rig it warms up and settles, at least 1.
+    usage : Usage
+        What is configured for it.
     """
 
     fleet: str
     seed: int
-    parameters: TankParameters
+    parameters: TankParameters | LabParameters
     acquisition: AcquisitionParameters = ACQUISITION
     pace: float = 1.0
+    usage: Usage = Usage()
+
+    @property
+    def held_c(self) -> float:
+        """Set point that the scenarios begin with."""
+        return self.usage.held_c
 
     def sources(self) -> tuple[Generator, Generator]:
-        """Return the randomness of tank and converter, anew for each run."""
+        """Return the randomness of plant and converter, anew for each run."""
         _, tank, converter = _generators(self.fleet, self.seed)
         return tank, converter
 
@@ -82,16 +117,22 @@ class Fleet:
     scenarios : tuple of str
         What its plants go through.
     draw : callable
-        Returns a tank from a generator.
+        Returns a tank or a lab from a generator.
     paced : bool
         Plants differ so much that each needs a pace of its own.
+    acquisition : AcquisitionParameters
+        The converter of its plants.
+    usage : Usage
+        What is configured for all of them alike.
     """
 
     number: int
     text: str
     scenarios: tuple[str, ...]
-    draw: Callable[[Generator], TankParameters]
+    draw: Callable[[Generator], TankParameters | LabParameters]
     paced: bool = True
+    acquisition: AcquisitionParameters = ACQUISITION
+    usage: Usage = Usage()
 
 
 def _rig(rng: Generator) -> TankParameters:
@@ -118,6 +159,10 @@ def _lags(rng: Generator) -> TankParameters:
         probe=replace(tank.probe, lag_s=sensor_s),
     )
     return specimen(lagging, rng, TOLERANCES)
+
+
+def _lab(rng: Generator) -> LabParameters:
+    return lab_specimen(LabParameters(), rng, TOLERANCES)
 
 
 def _between(rng: Generator, low: float, high: float) -> float:
@@ -150,6 +195,15 @@ FLEETS: Mapping[str, Fleet] = {
         ("warm-up", "cold-water"),
         _lags,
     ),
+    "tclab": Fleet(
+        4,
+        "the Temperature Control Lab: 4 g and 1 W a heater, held at 50 °C",
+        ("warm-up", "regulation", "step", "second-heater"),
+        _lab,
+        paced=False,
+        acquisition=LAB_ACQUISITION,
+        usage=Usage(50.0, setpoint_max_c=70.0, trip_above_c=80.0, gain_k_per_s=0.5, heater_w=1.0),
+    ),
 }
 """Every fleet by name."""
 
@@ -166,7 +220,10 @@ def plant(fleet: str, seed: int) -> Plant:
         raise FleetError(f"fleet must be one of {', '.join(FLEETS)}, got {fleet!r}")
     kind = FLEETS[fleet]
     parameters = kind.draw(_generators(fleet, seed)[0])
-    return Plant(fleet, seed, parameters, pace=_pace(parameters) if kind.paced else 1.0)
+    pace = 1.0
+    if kind.paced and isinstance(parameters, TankParameters):
+        pace = _pace(parameters)
+    return Plant(fleet, seed, parameters, kind.acquisition, pace, kind.usage)
 
 
 def _pace(tank: TankParameters) -> float:

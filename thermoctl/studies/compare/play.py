@@ -11,19 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from thermoctl.model.actuator import SquareLaw
-from thermoctl.model.sensor import LM335, Sensor
+from thermoctl.model.sensor import Sensor
 from thermoctl.plant.acquisition import Acquisition
-from thermoctl.plant.disturbances import disturb
-from thermoctl.plant.tank import Tank
 from thermoctl.quantities import Array
 from thermoctl.regulator import Plan, Regulator
 from thermoctl.signals import Mode, RawSample, SetPoint, State, Step
 from thermoctl.studies.compare.plants import PACE_S, Plant
-from thermoctl.studies.compare.scenarios import HELD_C, SETPOINT, Happening, Scenario
-
-DRIVE_STEPS = 2**12 - 1
-"""Steps of the converter that sets the drive of the power stage."""
+from thermoctl.studies.compare.scenarios import SETPOINT, Happening, Scenario
+from thermoctl.studies.compare.stand import stand_for
 
 _BROKEN = ("controller.failed", "estimator.failed", "output.nan")
 
@@ -37,7 +32,7 @@ class Trace:
     t_s : ndarray
         Time from the beginning of the stretch.
     true_c, setpoint_c : ndarray
-        Mean temperature of the water, and what was asked for.
+        Temperature that is judged, of water or heater, and what was asked for.
     power : ndarray
         What the hardware took, from this sample to the next.
     failure : str or None
@@ -88,16 +83,15 @@ def _settling_s(plant: Plant, scenario: Scenario) -> float:
 
 
 class _Bench:
-    """A regulator wired to a tank, a sample at a time."""
+    """A regulator wired to a plant, a sample at a time."""
 
     def __init__(self, plan: Plan, plant: Plant) -> None:
-        tank_rng, input_rng = plant.sources()
-        self._law = SquareLaw()
-        self._tank = Tank(plant.parameters, tank_rng, self._law)
+        plant_rng, input_rng = plant.sources()
+        self._stand = stand_for(plant, plant_rng)
         self._acquisition = Acquisition(plant.acquisition, input_rng)
         self._full_scale = float(plant.acquisition.full_scale)
-        self._sensor = Sensor(LM335, plant.acquisition.reference_v)
-        self._regulator = Regulator(replace(plan, setpoint_c=HELD_C, mode=Mode.AUTO))
+        self._sensor = Sensor(self._stand.curve, plant.acquisition.reference_v)
+        self._regulator = Regulator(replace(plan, setpoint_c=plant.held_c, mode=Mode.AUTO))
         self._period_s = plan.limits.period_s
         self._drive: float | None = None
         self.failure: str | None = None
@@ -105,15 +99,16 @@ class _Bench:
     def live(self, t_s: float, happenings: list[Happening]) -> tuple[float, float, float]:
         """Return true temperature, set point and accepted power of the sample at `t_s`."""
         if self._drive is not None:
-            self._tank.advance(self._period_s, self._drive)
+            self._stand.plant.advance(self._period_s, self._drive)
             self._acquisition.advance(self._period_s)
         for each in happenings:
             self._befall(each)
-        true_c = self._tank.temperature_c
+        true_c = self._stand.plant.temperature_c
         step = self._regulator.step(self._sensor.measure(self._sample(t_s), t_s))
         self._notice(step)
-        self._drive = round(self._law.drive_for(step.command.power) * DRIVE_STEPS) / DRIVE_STEPS
-        accepted = self._law.power_from(self._drive)
+        law, steps = self._stand.law, self._stand.drive_steps
+        self._drive = round(law.drive_for(step.command.power) * steps) / steps
+        accepted = law.power_from(self._drive)
         self._regulator.applied(accepted)
         return true_c, step.setpoint_c, accepted
 
@@ -122,10 +117,10 @@ class _Bench:
             wanted_c = self._regulator.setpoint_c + (happening.amount or 0.0)
             self._regulator.request(SetPoint(wanted_c))
         else:
-            disturb(self._tank, happening.name, happening.amount)
+            self._stand.befall(happening.name, happening.amount)
 
     def _sample(self, t_s: float) -> RawSample | None:
-        volts = self._tank.probe.volts()
+        volts = self._stand.volts()
         if math.isnan(volts):
             return None
         return RawSample(t_s, float(self._acquisition.convert(volts)), self._full_scale)

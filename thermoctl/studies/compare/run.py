@@ -31,14 +31,14 @@ _DECISIVE = (
     "control",
     "plant",
     "regulator",
-    *(f"studies/compare/{name}.py" for name in ("baselines", "play", "score")),
+    *(f"studies/compare/{name}.py" for name in ("baselines", "play", "score", "stand")),
 )
 """Source that decides what comes of a run: after a change to it, it is another program."""
 
 _DECISIVE_FOR_BOUNDS = (
     "quantities.py",
     "plant",
-    *(f"studies/compare/{name}.py" for name in ("bounds", "linear", "riccati", "swift")),
+    *(f"studies/compare/{name}.py" for name in ("bounds", "labs", "linear", "riccati", "swift")),
 )
 """Source that decides what the bounds are."""
 

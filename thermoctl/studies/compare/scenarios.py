@@ -9,7 +9,7 @@ SETPOINT = "setpoint"
 """Name of a happening that is no mishap: the operator asks for `amount` degC more."""
 
 HELD_C = 37.5
-"""Set point of O21, which every scenario begins with."""
+"""Set point of O21, which every scenario on a tank begins with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class Happening:
     at_s : float
         When, from the beginning of the stretch that is judged; negative: before it.
     name : str
-        A disturbance of `thermoctl.plant.disturbances`, or `SETPOINT`.
+        What `thermoctl.studies.compare.stand` can do to the plant, or `SETPOINT`.
     amount : float or None
         In the unit of the disturbance; None for its default.
     """
@@ -94,6 +94,7 @@ _ALL = (
         measures=("largest_k",),
     ),
     Scenario("half-gone", 1200.0, (Happening(0.0, "half-gone", 0.5),), measures=("largest_k",)),
+    Scenario("second-heater", 1200.0, (Happening(0.0, "second-heater", 0.5),), measures=_RECOVERY),
 )
 
 SCENARIOS: Mapping[str, Scenario] = {each.name: each for each in _ALL}

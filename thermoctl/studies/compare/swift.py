@@ -1,15 +1,16 @@
-"""The fastest way to a set point, on a tank that is known exactly.
+"""The fastest way to a set point, on a plant that is known exactly.
 
 More heat at any time makes everything hotter ever after, so the fastest law that does not leave the
 band on its far side is full power until a certain moment and none from then on: the water coasts to
-the edge of the band and no farther. That moment is searched on the tank itself, with steady mains
-and quiet ice.
+the edge of the band and no farther. That moment is searched on the plant itself, a tank with steady
+mains and quiet ice or a lab in a steady room.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 from thermoctl.plant import thermal
 from thermoctl.plant.parameters import WATER_J_PER_KG_K, TankParameters
@@ -18,6 +19,26 @@ LONGEST_S = 172_800.0
 """Beyond two days a set point counts as out of reach."""
 
 _HALVINGS = 30
+
+H = TypeVar("H")
+"""Where a plant is: whatever it goes on from."""
+
+
+class Steppable(Protocol[H]):
+    """A plant without noise; more power at any time makes it hotter ever after."""
+
+    @property
+    def period_s(self) -> float:
+        """Power is constant from one sample to the next, this long."""
+        ...
+
+    def advance(self, heat: H, power: float) -> H:
+        """Return where it is one period later; `power` is a fraction in [0, 1]."""
+        ...
+
+    def bulk_c(self, heat: H) -> float:
+        """Return the temperature that is judged."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,15 +96,15 @@ class Swift:
 
 
 def swiftest(
-    known: Known, heat: thermal.Heat, target_c: float, band_k: float = 0.1, peak_k: float = 0.1
+    known: Steppable[H], heat: H, target_c: float, band_k: float = 0.1, peak_k: float = 0.1
 ) -> Swift | None:
     """Return the fastest way from `heat` to `target_c`; None: it cannot be reached.
 
     Parameters
     ----------
-    known : Known
-        The tank.
-    heat : Heat
+    known : Steppable
+        The plant.
+    heat : object
         Where it is.
     target_c : float
         Where it is to be, above where it is.
@@ -105,12 +126,13 @@ def swiftest(
         middle = 0.5 * (low + high)
         coast_c = _coast(known, heated, middle)
         low, high = (low, middle) if max(coast_c) > target_c + peak_k else (middle, high)
-    path_c = bulk_c[: int(low) + 1] + _coast(known, heated, low)
+    # After its peak a plant can be held, so how steeply it would fall without power is no matter.
+    path_c = bulk_c[: int(low) + 1] + _coast(known, heated, low)[:-1]
     settled = _settled(path_c, target_c - band_k)
     return Swift(known.period_s * settled, known.period_s * low, min(path_c))
 
 
-def _coast(known: Known, heated: list[thermal.Heat], samples: float) -> list[float]:
+def _coast(known: Steppable[H], heated: list[H], samples: float) -> list[float]:
     """Return the water's temperatures after so many samples of full power, while they rise.
 
     A part of a sample is that part of full power, which is what a controller could ask for.
