@@ -6,6 +6,8 @@ Implements section 4 of ``docs/theory.md``.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, insort
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -15,6 +17,7 @@ from thermoctl.estimation.belief import LARGEST, frozen, positive, truth
 from thermoctl.estimation.kalman import CorrectedKalman, RandomWalkKalman
 from thermoctl.estimation.least_squares import RecursiveLeastSquares
 from thermoctl.estimation.recursion import RecursiveLaw
+from thermoctl.estimation.stack import Stacked, stack
 from thermoctl.quantities import Array, clamp
 from thermoctl.signals import Estimate
 
@@ -33,16 +36,20 @@ _WITH_R2 = (CorrectedKalman, RandomWalkKalman)
 
 
 class _Memory(NamedTuple):
-    """What the guards remember: spread of the regressor, parallel least squares, residuals."""
+    """What the guards remember: spread of the regressor, parallel least squares, residuals.
+
+    The residuals are there twice, newest first and by size; nobody writes to either.
+    """
 
     phi_mean: tuple[float, ...]
     spread_squared: float
     parallel: Estimate
-    residuals: Array
+    residuals: tuple[float, ...] = ()
+    ranked: Sequence[float] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GuardedEstimate(Estimate):
+class GuardedEstimate(Stacked):
     """An estimate with what its guards remember.
 
     Parameters
@@ -131,9 +138,10 @@ class Guarded:
         memory = self._remembered(before, phi, y)
         excitation = math.sqrt(memory.spread_squared)
         paused = self.excitation_min is not None and excitation < self.excitation_min
-        return GuardedEstimate(
+        P = before.P if paused else self._bounded(learned.P)
+        after = GuardedEstimate(
             before.theta if paused else learned.theta,
-            before.P if paused else self._bounded(learned.P),
+            P,
             learned.innovation,
             learned.innovation_var,
             1.0 if paused else learned.inflation,
@@ -142,6 +150,9 @@ class Guarded:
             getattr(law, "R2", math.nan),
             memory,
         )
+        if P is learned.P:
+            object.__setattr__(after, "rows", stack(learned))
+        return after
 
     def _bounded(self, P: Array) -> Array:
         """Return P with no variance above `covariance_max` and its correlations kept."""
@@ -153,12 +164,10 @@ class Guarded:
     def _law(self, memory: _Memory | None) -> RecursiveLaw:
         """Return the law with the R2 of the moment."""
         law = self.law
-        if not self.robust_R2 or memory is None or len(memory.residuals) < RESIDUALS_MIN:
+        if not self.robust_R2 or memory is None or len(memory.ranked) < RESIDUALS_MIN:
             return law
         assert isinstance(law, _WITH_R2)
-        middle, ranked = len(memory.residuals) // 2, memory.residuals.copy()
-        ranked.partition(middle)
-        sd = NORMAL_SD * ranked.item(middle)
+        sd = NORMAL_SD * memory.ranked[len(memory.ranked) // 2]
         least = R2_FLOOR * law.R2 if self.R2_min is None else self.R2_min
         R2 = clamp(max(sd * sd, least), 1.0 / LARGEST, LARGEST)
         return law if R2 == law.R2 else replace(law, R2=R2)
@@ -169,15 +178,14 @@ class Guarded:
         if memory is None:
             scale = getattr(self.law, "R2", 1.0)  # least squares counts in units of the noise
             parallel = Estimate(before.theta, frozen(before.P / scale))
-            memory = _Memory(tuple(values), 0.0, parallel, np.empty(0))
+            memory = _Memory(tuple(values), 0.0, parallel)
         phi_mean, spread_squared = _moved(memory, values)
-        parallel, residuals = memory.parallel, memory.residuals
-        if self.robust_R2:
-            parallel = PARALLEL.update(parallel, phi, y)
-            residuals = residuals[: RESIDUALS - 1]
-            if not parallel.rejected:
-                residuals = _before(abs(parallel.innovation), residuals)
-        return _Memory(phi_mean, spread_squared, parallel, residuals)
+        if not self.robust_R2:
+            return _Memory(phi_mean, spread_squared, memory.parallel)
+        parallel = PARALLEL.update(memory.parallel, phi, y)
+        newest = None if parallel.rejected else abs(parallel.innovation)
+        residuals, ranked = _renewed(memory.residuals, memory.ranked, newest)
+        return _Memory(phi_mean, spread_squared, parallel, residuals, ranked)
 
 
 def _adopted(belief: Estimate) -> GuardedEstimate:
@@ -205,9 +213,15 @@ def _moved(memory: _Memory, phi: list[float]) -> tuple[tuple[float, ...], float]
     return tuple(mean), (1.0 - share) * (memory.spread_squared + share * squared)
 
 
-def _before(newest: float, rest: Array) -> Array:
-    """Return `newest` and after it the `rest`; at once, what concatenating does in three steps."""
-    longer = np.empty(len(rest) + 1)
-    longer[0] = newest
-    longer[1:] = rest
-    return frozen(longer)
+def _renewed(
+    residuals: tuple[float, ...], ranked: Sequence[float], newest: float | None
+) -> tuple[tuple[float, ...], Sequence[float]]:
+    """Return the residuals with `newest`, if there is one, and without what is too old."""
+    ranked = list(ranked)
+    for oldest in residuals[RESIDUALS - 1 :]:
+        del ranked[bisect_left(ranked, oldest)]
+    residuals = residuals[: RESIDUALS - 1]
+    if newest is not None:
+        insort(ranked, newest)
+        residuals = (newest, *residuals)
+    return residuals, ranked
