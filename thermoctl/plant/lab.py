@@ -99,7 +99,7 @@ class LabParameters:
 
 
 class LabHeat(NamedTuple):
-    """Temperatures in degC; heat from both heaters and to the room since the start, in J."""
+    """Temperatures in degC; heat from both heaters and to the room, in J."""
 
     first_c: float
     second_c: float
@@ -120,7 +120,7 @@ def passed_w(parameters: LabParameters, area_m2: float, warm_c: float, cold_c: f
 
 
 def rates(p: LabParameters, heat: LabHeat, watts: tuple[float, float], room_c: float) -> LabHeat:
-    """Return the rate of every entry of `heat` a second, with `watts` in the two heaters."""
+    """Return the rates of `heat` in a second, with `watts` in the two heaters."""
     first_w, second_w = watts
     across_w = passed_w(p, p.between_m2, heat.second_c, heat.first_c)
     from_first_w = passed_w(p, p.area_m2, heat.first_c, room_c)
