@@ -21,6 +21,11 @@ from thermoctl.studies.record import (
 MAGIC = b"SQLite format 3\0"
 """How every SQLite file begins."""
 
+_APART_PERIODS = 10.0
+"""Between two runs that overlap by the wall clock: a gap, and short enough for a figure."""
+
+_MOVED = "runs put behind the one before, because they overlap by the wall clock: {}"
+
 _NUMBERS = tuple(column.name for column in COLUMNS if column.kind == "REAL")
 
 
@@ -33,8 +38,9 @@ def is_history(path: Path) -> bool:
 def read_history_record(path: Path, wanted: Columns, loop: str | None = None) -> Record:
     """Return the record of one loop in the history at `path`.
 
-    Time is the loop's own; between two runs of the daemon it goes on by the wall clock. Cycles
-    without a temperature or an accepted power are left out and counted.
+    Time is the loop's own; between two runs of the daemon it goes on by the wall clock. A run that
+    began before the one before it had ended, as bench tests do that are faster than the clock, is
+    put behind it. Cycles without a temperature or an accepted power are left out and counted.
 
     Parameters
     ----------
@@ -62,7 +68,10 @@ def read_history_record(path: Path, wanted: Columns, loop: str | None = None) ->
         raise RecordError(f"{path.name}: expected --loop, one of {', '.join(loops)}")
     time = kept[str(names.time)]
     if names.time == "t_s":
-        time = _through_runs(kept["run"], kept["wall_utc_s"], time)
+        order = np.argsort(kept["run"], kind="stable")  # two writers may have taken turns
+        kept = {name: column[order] for name, column in kept.items()}
+        time, moved = _through_runs(kept["run"], kept["wall_utc_s"], kept["t_s"])
+        notes += [_MOVED.format(moved)] if moved else []
     collector = Collector(path.name, names, notes)
     rows = zip(
         time.tolist(),
@@ -90,7 +99,19 @@ def _take(collector: Collector, number: int, t_s: float, u: float, y: float) -> 
     collector.add(f"cycle {number}", t_s, u, y)
 
 
-def _through_runs(run: Array, wall_s: Array, t_s: Array) -> Array:
-    """Return the loop's time with every run put where the wall clock saw it begin."""
-    _, first, place = np.unique(run, return_index=True, return_inverse=True)
-    return t_s + (wall_s - t_s)[first][place]
+def _through_runs(run: Array, wall_s: Array, t_s: Array) -> tuple[Array, int]:
+    """Return the loop's time through all runs, and how many were put behind the one before.
+
+    Runs stand one after the other; each begins when the wall clock saw it begin, but never before
+    the one before it has ended.
+    """
+    starts = np.flatnonzero(np.diff(run, prepend=math.nan) != 0.0)
+    time, moved, free_s = np.empty(len(t_s)), 0, -math.inf
+    for begin, end in zip(starts, [*starts[1:], len(t_s)], strict=True):
+        own_s = t_s[begin:end]
+        begin_s = max(wall_s[begin], free_s)
+        moved += bool(begin_s > wall_s[begin])
+        time[begin:end] = begin_s + (own_s - own_s[0])
+        period_s = float(np.median(np.diff(own_s))) if len(own_s) > 1 else 1.0
+        free_s = time[end - 1] + _APART_PERIODS * period_s
+    return time, moved

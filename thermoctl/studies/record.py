@@ -127,7 +127,7 @@ class Collector:
             self.skip(where, f"{wildest:g} is no number that could be meant")
             return
         if self._t and not t_s > self._t[-1]:
-            self.skip(where, f"time {t_s:g} s does not lie after {self._t[-1]:g} s")
+            self.skip(where, f"time {t_s:.12g} s does not lie after {self._t[-1]:.12g} s")
             return
         self._t.append(t_s)
         self._u.append(u)

@@ -53,6 +53,12 @@ def test_only_the_first_of_many_bad_rows_is_named(write):
     assert "line 6" not in note
 
 
+def test_a_time_since_1970_that_goes_back_is_told_to_the_second(write):
+    since_1970 = "".join(f"{t},1,20\n" for t in (1795342968, 1795342970, 1795342969, 1795342971))
+    record = read_csv(write("t,u,y\n" + since_1970), NAMED)
+    assert any("1795342969 s does not lie after 1795342970 s" in note for note in record.notes)
+
+
 def test_a_hole_where_rows_were_left_out_begins_a_new_stretch(write):
     record = read_csv(write("t,u,y\n" + rows(4) + "4,1,nan\n" + rows(4, start=5)), NAMED)
     assert record.stretch_start.tolist() == [0, 0, 0, 0, 4, 4, 4, 4]

@@ -93,6 +93,30 @@ def test_a_restart_is_a_gap_as_long_as_the_wall_clock_says(write):
     assert record.stretch_start.tolist() == [0] * 5 + [5] * 5
 
 
+def test_a_run_that_began_before_the_last_one_ended_is_put_behind_it_whole(write):
+    # a bench test makes an hour in a minute of the wall clock, and the next one follows at once
+    first, second = ([cycle(float(k)) for k in range(5)] for _ in range(2))
+    record = read_history_record(write((1e9, first), (1e9 + 2.0, second)), Columns())
+    assert record.t_s.tolist() == [0, 1, 2, 3, 4, 14, 15, 16, 17, 18]
+    assert record.stretch_start.tolist() == [0] * 5 + [5] * 5
+    assert record.skipped == 0
+    assert any("overlap by the wall clock: 1" in note for note in record.notes)
+
+
+def test_two_runs_that_wrote_in_turns_are_told_apart(tmp_path):
+    writers = [
+        HistoryWriter(tmp_path / "h.sqlite", RunInfo(version), wall_clock=lambda: 1e9)
+        for version in ("1.0", "1.1")
+    ]
+    for k in range(4):
+        for number, writer in enumerate(writers):
+            writer.publish(cycle(float(k), temperature_c=20.0 + number))
+            assert writer.store_waiting()
+    record = read_history_record(tmp_path / "h.sqlite", Columns())
+    assert record.y.tolist() == [20.0] * 4 + [21.0] * 4
+    assert record.stretch_start.tolist() == [0] * 4 + [4] * 4
+
+
 def test_a_wall_clock_that_is_set_does_not_tear_a_run(tmp_path):
     now = [1e9]
     writer = HistoryWriter(tmp_path / "h.sqlite", RunInfo("1.0"), wall_clock=lambda: now[0])
