@@ -24,7 +24,8 @@ class Changeover:
     def after(self, taken: float, interval_s: float) -> Changeover:
         """Return this after the signed power `taken` for `interval_s`."""
         if taken != 0.0:
-            return Changeover(math.copysign(1.0, taken))
+            side = math.copysign(1.0, taken)
+            return self if side == self.side and self.off_s == 0.0 else Changeover(side)
         return Changeover(self.side, self.off_s + interval_s)
 
     def waits(self, power: float, least_s: float) -> bool:

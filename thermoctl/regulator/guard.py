@@ -5,11 +5,12 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TypeVar, TypeVarTuple
 
 from thermoctl.regulator.supervisor import Supervisor
 
 T = TypeVar("T")
+Given = TypeVarTuple("Given")
 
 _FAULT = 58
 
@@ -22,17 +23,22 @@ class Failure:
     trace: str
 
 
-def attempt(law: Callable[[], T]) -> T | Failure:
-    """Return what `law` returns, or what it raised.
+def attempt(law: Callable[[*Given], T], *given: *Given) -> T | Failure:
+    """Return what `law` makes of what is `given`, or what it raised.
 
-    Anything may come out of a plug-in, so this is the one place below the loop where every
+    Anything may come out of a plug-in, so this file is the one place below the loop where every
     exception is caught.
     """
     try:
-        return law()
+        return law(*given)
     except Exception as error:  # noqa: BLE001 - the boundary to third-party laws
-        text = f"expected a result, got {type(error).__name__}: {error}"
-        return Failure(text, traceback.format_exc())
+        return _failure(error)
+
+
+def _failure(error: Exception) -> Failure:
+    """Return in words what is being handled."""
+    text = f"expected a result, got {type(error).__name__}: {error}"
+    return Failure(text, traceback.format_exc())
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +53,13 @@ class Guard:
 
     supervisor: Supervisor
 
-    def call(self, law: Callable[[], T], otherwise: T, code: str, t_s: float) -> T:
-        """Return what `law` returns, or `otherwise` after the fault `code`."""
-        came = attempt(law)
-        if isinstance(came, Failure):
-            self.supervisor.fail(code, _FAULT, came.text, t_s, trace=came.trace)
+    def call(
+        self, code: str, t_s: float, otherwise: T, law: Callable[[*Given], T], *given: *Given
+    ) -> T:
+        """Return what `law` makes of what is `given`, or `otherwise` after the fault `code`."""
+        try:
+            return law(*given)
+        except Exception as error:  # noqa: BLE001 - the boundary to third-party laws
+            failure = _failure(error)
+            self.supervisor.fail(code, _FAULT, failure.text, t_s, trace=failure.trace)
             return otherwise
-        return came

@@ -14,6 +14,10 @@ from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import Beliefs, Estimate
 
 _FAILED = "estimator.failed"
+_SILENT = Beliefs()
+
+_Learnt = tuple[IdentifierBelief, IdentifierBelief | None, bool]
+"""The belief after a sample, what is foreseen without one, and whether all of it is finite."""
 
 
 class Learning:
@@ -47,23 +51,23 @@ class Learning:
 
         Without a reading, what the model foresees is kept beside the belief, for RIDE to act on.
         """
-        before, identifier = self._belief, self._identifier
-        seen = not math.isnan(temperature_c)
-        last = before if self._foreseen is None else self._foreseen
-
-        def learn() -> tuple[IdentifierBelief, IdentifierBelief | None, bool]:
-            foreseen = None if seen else identifier.foresee(last, applied)
-            after = identifier.update(before, temperature_c, applied)
-            estimate = after.estimate
-            return after, foreseen, _all_finite(estimate.theta) and _all_finite(estimate.P)
-
-        kept: tuple[IdentifierBelief, IdentifierBelief | None, bool] = (before, None, True)
-        after, self._foreseen, finite = self._guard.call(learn, kept, _FAILED, t_s)
+        kept: _Learnt = (self._belief, None, True)
+        after, self._foreseen, finite = self._guard.call(
+            _FAILED, t_s, kept, self._learn, temperature_c, applied
+        )
         if finite:
             self._belief = after
         else:
             text = "expected finite parameters, went back to the last good ones"
             self._supervisor.fail("estimator.reset", 11, text, t_s)
+
+    def _learn(self, temperature_c: float, applied: float) -> _Learnt:
+        before, foreseen = self._belief, None
+        if math.isnan(temperature_c):
+            foreseen = self._identifier.foresee(self._foreseen or before, applied)
+        after = self._identifier.update(before, temperature_c, applied)
+        estimate = after.estimate
+        return after, foreseen, _all_finite(estimate.theta) and _all_finite(estimate.P)
 
     def hold(self, deviation_k: float, applied: float, seen_s: float) -> None:
         """Note which power was `applied` while the plant was held, or not."""
@@ -95,13 +99,12 @@ class Learning:
 
     def beliefs(self, t_s: float) -> Beliefs:
         """Return what is known beside any controller: the pole, and the holding power."""
-        estimate, structure = self._belief.estimate, self._identifier.structure
+        return self._guard.call(_FAILED, t_s, _SILENT, self._words)
 
-        def beliefs() -> Beliefs:
-            a, a_sd = structure.pole(estimate.theta, estimate.P)
-            return Beliefs(a=a, a_sd=a_sd, holding_power=self._holding.known)
-
-        return self._guard.call(beliefs, Beliefs(), _FAILED, t_s)
+    def _words(self) -> Beliefs:
+        estimate = self._belief.estimate
+        a, a_sd = self._identifier.structure.pole(estimate.theta, estimate.P)
+        return Beliefs(None, None, a, a_sd, self._holding.known)
 
 
 def _all_finite(values: Array) -> bool:

@@ -28,7 +28,7 @@ def recall(minds: Iterable[Mind | None], remembered: Mapping[str, Remembered], e
         kept = None if mind is None else remembered.get(mind.name)
         if mind is None or kept is None:
             continue
-        begun = attempt(partial(mind.recall, kept))
+        begun = attempt(mind.recall, kept)
         if isinstance(begun, Failure):
             emit("model.ignored", controller=mind.name, why=begun.text)
         elif begun:
@@ -39,7 +39,7 @@ def origin(mind: Mind) -> str | None:
     """Return how the model of `mind` began; None of a law without a memory."""
     if mind.remembers is None:
         return None
-    told = attempt(partial(mind.remembers.origin, mind.belief))
+    told = attempt(mind.remembers.origin, mind.belief)
     return told if isinstance(told, str) else None
 
 
@@ -57,7 +57,7 @@ def _remembered(held: Iterable[tuple[str, Remembering, Any]]) -> Models:
     """Return what each law makes of its belief; nothing of one that fails."""
     models: dict[str, Mapping[str, Any]] = {}
     for name, law, belief in held:
-        told = attempt(partial(law.remember, belief))
+        told = attempt(law.remember, belief)
         if told is not None and not isinstance(told, Failure):
             models[name] = told
     return models

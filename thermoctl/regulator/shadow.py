@@ -75,9 +75,9 @@ class Shadow:
         mind = self._mind
         if mind is None:
             return
-        of_charge = attempt(lambda: charge.surprise_k(situation))  # a score costs no heat
-        of_shadow = attempt(lambda: mind.surprise_k(situation))
-        seen = attempt(lambda: mind.observe(situation))
+        of_charge = attempt(charge.surprise_k, situation)  # a score costs no heat
+        of_shadow = attempt(mind.surprise_k, situation)
+        seen = attempt(mind.observe, situation)
         self._surprises_k = (_number(of_charge), _number(of_shadow))
         if isinstance(of_shadow, Failure):
             self._drop(of_shadow)
@@ -102,7 +102,7 @@ class Shadow:
         if mind is None:
             return
         if math.isfinite(situation.temperature_c):
-            asked = attempt(lambda: mind.decide(situation))
+            asked = attempt(mind.decide, situation)
             if isinstance(asked, Failure):
                 self._drop(asked)
                 return

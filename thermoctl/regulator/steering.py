@@ -15,6 +15,7 @@ from thermoctl.regulator.supervisor import Emit
 from thermoctl.signals import Beliefs, PlantBelief
 
 _FAILED = "controller.failed"
+_SILENT = Beliefs()
 
 
 class Steering:
@@ -43,27 +44,24 @@ class Steering:
 
     def observe(self, situation: Situation) -> None:
         """Show the controller a sample, whether its power is wanted or not."""
-        self._guard.call(lambda: self.mind.observe(situation), None, _FAILED, situation.t_s)
+        self._guard.call(_FAILED, situation.t_s, None, self.mind.observe, situation)
 
     def decide(self, situation: Situation) -> object:
         """Return what the controller asks for; 0 when it fails."""
         nothing: object = 0.0
-        return self._guard.call(
-            lambda: self.mind.decide(situation), nothing, _FAILED, situation.t_s
-        )
+        return self._guard.call(_FAILED, situation.t_s, nothing, self.mind.decide, situation)
 
     def beliefs(self, situation: Situation, otherwise: Beliefs) -> Beliefs:
         """Return the controller's words, those of `otherwise` where it says nothing."""
-        mind = self.mind
+        t_s = situation.t_s
+        return self._guard.call(_FAILED, t_s, _SILENT, self._words, situation, otherwise)
 
-        def beliefs() -> Beliefs:
-            told = mind.controller.beliefs(mind.belief, situation)
-            pole = otherwise if told.a is None else told
-            holding = otherwise if told.holding_power is None else told
-            power = holding.holding_power
-            return Beliefs(told.gain, told.gain_sd, pole.a, pole.a_sd, power, told.lag_s)
-
-        return self._guard.call(beliefs, Beliefs(), _FAILED, situation.t_s)
+    def _words(self, situation: Situation, otherwise: Beliefs) -> Beliefs:
+        told = self.mind.controller.beliefs(self.mind.belief, situation)
+        pole = otherwise if told.a is None else told
+        holding = otherwise if told.holding_power is None else told
+        power = holding.holding_power
+        return Beliefs(told.gain, told.gain_sd, pole.a, pole.a_sd, power, told.lag_s)
 
     @property
     def tell(self) -> Callable[[], PlantBelief | None]:
@@ -75,23 +73,15 @@ class Steering:
         known = is_finite_number(beliefs.holding_power) and math.isfinite(situation.temperature_c)
         if not known:
             return 0.0
-        mind = self.mind
-        return self._guard.call(
-            lambda: clamp(mind.controller.ride_s(mind.belief), 0.0, most_s),
-            0.0,
-            _FAILED,
-            situation.t_s,
-        )
+        return self._guard.call(_FAILED, situation.t_s, 0.0, self._rides, most_s)
+
+    def _rides(self, most_s: float) -> float:
+        return clamp(self.mind.controller.ride_s(self.mind.belief), 0.0, most_s)
 
     def tell_remarks(self, t_s: float) -> None:
         """Say which conditions have appeared since the last sample, and which are gone."""
-        mind, before = self.mind, self._remarks
-
-        def remarks() -> dict[str, str]:
-            told = mind.controller.remarks(mind.belief)
-            return {str(name): str(text) for name, text in told.items()}
-
-        self._remarks = self._guard.call(remarks, dict(before), _FAILED, t_s)
+        before = self._remarks
+        self._remarks = self._guard.call(_FAILED, t_s, before, self._remarked)
         if not before and not self._remarks:
             return
         for name in before.keys() - self._remarks.keys():
@@ -100,10 +90,14 @@ class Steering:
             if name not in before:
                 self._emit(name, active=True, text=text)
 
+    def _remarked(self) -> Mapping[str, str]:
+        told = self.mind.controller.remarks(self.mind.belief)
+        return {str(name): str(text) for name, text in told.items()}
+
 
 def _plant(controller: Controller, belief: Any) -> PlantBelief | None:
     """Return what `controller` says of its plant; None where it cannot, or fails."""
     if not isinstance(controller, Knowing):
         return None
-    told = attempt(lambda: controller.plant(belief))
+    told = attempt(controller.plant, belief)
     return None if isinstance(told, Failure) else told

@@ -61,8 +61,7 @@ class Supervisor:
         self.state = State.RUN
         self._emit = emit
         self._judged = Judged()
-        self._reading = math.nan
-        self._farthest = math.nan, math.nan  # what is held against the upper and the lower trip
+        self._measurement = Measurement(math.nan)
         self._good_s = 0.0  # good readings without a break
         self._blind_s = 0.0  # time without a good reading that was not paid back yet
         self._seen_s = 0.0  # what the last reading answers for
@@ -98,8 +97,7 @@ class Supervisor:
         """
         before = self._judged.verdict
         self._judged = judge(self._judged, measurement, self.limits, jump_k)
-        self._reading = measurement.temperature_c
-        self._farthest = farthest(measurement, self.limits)
+        self._measurement = measurement
         self._seen_s = seen_s = self.limits.seen_s(interval_s)
         verdict = self._judged.verdict
         if verdict is Verdict.GOOD:
@@ -109,7 +107,8 @@ class Supervisor:
             self._good_s = 0.0
             self._blind_s += interval_s
         if verdict is Verdict.SPIKE:
-            self._emit("sensor.spike", temperature_c=self._reading, ignored=self._judged.outliers)
+            ignored = self._judged.outliers
+            self._emit("sensor.spike", temperature_c=measurement.temperature_c, ignored=ignored)
         if verdict is Verdict.OPEN and before is not Verdict.OPEN:
             self._opened_s.append(t_s)
         return verdict
@@ -131,7 +130,8 @@ class Supervisor:
 
     def _trip(self, verdict: Verdict, t_s: float) -> None:
         code, fault = _TRIPS[verdict]
-        limits, got_c = self.limits, self._farthest[verdict is Verdict.UNDER]
+        limits = self.limits
+        got_c = farthest(self._measurement, limits)[verdict is Verdict.UNDER]
         text = (
             f"expected {limits.trip_below_c:g} to {limits.trip_above_c:g} degC, "
             f"got {got_c:.2f} degC"
