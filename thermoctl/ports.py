@@ -81,7 +81,9 @@ class Board(Protocol):
     """Hardware with inputs and outputs; every call blocks until a deadline.
 
     A class is built as ``Driver(settings, link, clock)`` and does no I/O before `open`.
-    `read` and `write` raise a `thermoctl.errors.DriverError`, never anything else.
+    `read` and `write` raise a `thermoctl.errors.DriverError`, never anything else. Settings that
+    have `inputs` and `outputs`, the names of the channels they make, let a configuration that
+    names another one be refused before anything runs.
     """
 
     Settings: ClassVar[type[Any]]

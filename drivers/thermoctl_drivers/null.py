@@ -41,6 +41,16 @@ class NullSettings(BaseModel):
         return self
 
     @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the channels that are read."""
+        return (INPUT,)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the channels that may be written."""
+        return (OUTPUT,)
+
+    @property
     def reading(self) -> float:
         """The counts to read."""
         if self.counts is not None:

@@ -93,9 +93,20 @@ class SimulatedSettings(BaseModel):
     )
     seed: int = Field(1, ge=0, description="Seed of all randomness; equal seeds, equal runs.")
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the channels that are read."""
+        second = (SECOND_INPUT,) if self.second_sensor else ()
+        return (INPUT, *second, *((ELEMENT,) if self.element_sensor else ()))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the channels that may be written."""
+        return (OUTPUT, COOLER) if self.cooler_w > 0.0 else (OUTPUT,)
+
 
 class SimulatedBoard:
-    """Inputs and outputs on a simulated tank; a `Board` that is `Simulated`.
+    """Bench test: a simulated tank with its sensor, heater and, if asked for, cooler.
 
     The input ``temperature`` is the sum of a burst of conversions of an LM335, and so is
     ``temperature2`` and ``element``, where there is a second sensor and one on the heater. The
@@ -138,7 +149,7 @@ class SimulatedBoard:
         self._drive_steps = 2**settings.dac_bits - 1
         self._is_open = False
         self._now_s = math.nan
-        self._drives = {OUTPUT: 0.0, COOLER: 0.0} if settings.cooler_w > 0.0 else {OUTPUT: 0.0}
+        self._drives = dict.fromkeys(settings.outputs, 0.0)
         self._armed_until_s = -math.inf
         self._sequence = 0
         self._last_good_s: float | None = None

@@ -75,6 +75,16 @@ class ThermoDaqSettings(BaseModel):
         0.08, ge=0.01, le=1.0, allow_inf_nan=False, description="Longest wait for one reply in s."
     )
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the channels that are read."""
+        return (INPUT,)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the channels that may be written."""
+        return (OUTPUT,)
+
 
 class ThermoDaq:
     """thermodaq: LM335 in, heater out, dead-man; an Arduino Uno on a serial port.

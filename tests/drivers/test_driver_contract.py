@@ -66,6 +66,32 @@ class TestNull(DriverContract):
         return Rig(NullBoard(NullSettings(), None, clock), clock, output_name="")
 
 
+@pytest.mark.parametrize(
+    "settings",
+    [
+        NullSettings(),
+        SimulatedSettings(),
+        SimulatedSettings(second_sensor=True, element_sensor=True, cooler_w=300.0),
+    ],
+)
+def test_a_board_reads_and_takes_what_its_settings_name(
+    settings: NullSettings | SimulatedSettings,
+) -> None:
+    clock = ManualClock()
+    kind = NullBoard if isinstance(settings, NullSettings) else SimulatedBoard
+    rig = Rig(kind(settings, None, clock), clock).opened()  # type: ignore[arg-type]
+    assert set(rig.read()) == set(settings.inputs)
+    taken = rig.board.write(dict.fromkeys(settings.outputs, 0.0), 2.0, clock.now_s() + 1.0)
+    assert set(taken) == set(settings.outputs)
+
+
+def test_the_board_on_a_port_reads_what_its_settings_name() -> None:
+    settings = ThermoDaqSettings(port="lock-step")
+    rig = thermodaq_rig(BoardModel()).opened()
+    assert set(rig.read()) == set(settings.inputs)
+    assert settings.outputs == (rig.output_name,)
+
+
 def test_a_device_satisfies_the_port_of_a_lock_step_line() -> None:
     device: Device = BoardModel()
     device.advance(0.1)

@@ -20,7 +20,7 @@ from thermoctl.app.cascades import cascade_errors
 from thermoctl.app.parts import law_for, plan_for, sensor_for
 from thermoctl.app.plugins import BadOption
 from thermoctl.app.settings import Settings
-from thermoctl.app.tables import CascadeTable, LoopTable
+from thermoctl.app.tables import CascadeTable, LoopTable, SensorTable
 from thermoctl.errors import ConfigError, LinkError
 from thermoctl.model.actuator import Linear
 from thermoctl.ports import Board, Clock, Remembered
@@ -129,8 +129,8 @@ def loop_for(
     Raises
     ------
     ConfigError
-        A loop has no sensor or actuator, periods differ, two loops drive one output, or a board
-        without a dead-man is not accepted.
+        A loop has no sensor or actuator, or one that its board does not have, periods differ, two
+        loops drive one output, or a board without a dead-man is not accepted.
     """
     wrong = list(wiring_errors(settings))
     if wrong:
@@ -168,6 +168,7 @@ def wiring_errors(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
                 yield ("loops", name), f"needs a table [loops.{name}.{part}] to run"
         if len(periods) > 1:
             yield ("loops", name, "period_s"), f"expected one for all loops, got {periods}"
+        yield from _channel_errors(settings, name, table)
     driven = _outputs(settings)
     for (used, output), names in driven.items():
         if len(names) > 1:
@@ -189,6 +190,31 @@ def wiring_errors(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
                 f"{driver.__name__} cannot switch its output off by itself; add an independent "
                 "thermostat and say service.accept_no_dead_man = true to run it",
             )
+
+
+def _channel_errors(
+    settings: Settings, name: str, table: LoopTable
+) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield each channel of a loop that its board says it does not have.
+
+    Unfound, a wrong input is a sensor that never answers, and a wrong output the first refusal.
+    """
+    parts = {
+        "sensor": table.sensor,
+        "second_sensor": table.second_sensor,
+        "actuator": table.actuator,
+        "cooler": table.cooler,
+    }
+    for part, channel in parts.items():
+        if channel is None or isinstance(channel, CascadeTable):
+            continue
+        key = "input" if isinstance(channel, SensorTable) else "output"
+        known = getattr(settings.boards[channel.board], f"{key}s", None)
+        wanted = getattr(channel, key)
+        if known is not None and wanted not in known:
+            hint = plugins.nearest(wanted, known)
+            text = f"board {channel.board!r} has no {key} {wanted!r}{hint}"
+            yield ("loops", name, part, key), text
 
 
 def _outputs(settings: Settings) -> dict[tuple[str, str], list[str]]:

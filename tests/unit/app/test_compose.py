@@ -194,9 +194,8 @@ def test_a_loop_without_a_channel_cannot_run(whole, part):
 
 def test_two_loops_must_agree_on_the_period(whole):
     content = changed(whole, "loops.mash", setpoint_c=65.0, trip_above_c=80.0, period_s=2.0)
-    for part in ("sensor", "actuator"):
-        content["loops"]["mash"][part] = {"board": "daq", "output": "second"}
-    del content["loops"]["mash"]["sensor"]["output"]
+    content["boards"]["other"] = {"kind": "simulated"}
+    content["loops"]["mash"] |= {part: {"board": "other"} for part in ("sensor", "actuator")}
     assert errors(content) == [
         "loops.tank.period_s: expected one for all loops, got [1.0, 2.0]",
         "loops.mash.period_s: expected one for all loops, got [1.0, 2.0]",
@@ -225,3 +224,38 @@ def test_a_start_in_another_mode_leaves_the_rest_as_it_is(whole):
     started = started_as(settings, {"tank": (Mode.AUTO, 40.0)})
     assert (started.loops["tank"].mode, started.loops["tank"].setpoint_c) == (Mode.AUTO, 40.0)
     assert started_as(started, {"tank": (Mode.OFF, 37.5)}) == settings
+
+
+@pytest.mark.parametrize(
+    ("path", "names", "told"),
+    [
+        ("loops.tank.sensor", {"input": "temprature"}, "input 'temprature'; did you mean 'tempe"),
+        ("loops.tank.actuator", {"output": "heeter"}, "output 'heeter'; did you mean 'heater'"),
+        ("loops.tank.cooler", {"board": "daq", "output": "cooler"}, "output 'cooler'; known: heat"),
+        ("loops.tank.second_sensor", {"board": "daq", "input": "b"}, "input 'b'; known: temper"),
+    ],
+)
+def test_a_channel_that_its_board_does_not_have_is_named_before_anything_runs(
+    whole, path, names, told
+):
+    content = changed(whole, path, **names)
+    if "cooler" in path:
+        content["loops"]["tank"]["controller"] = {"kind": "pid", "action": "heat-cool"}
+    (error,) = errors(content)
+    key = next(each for each in ("input", "output") if each in names)
+    assert error.startswith(f"{path}.{key}: board 'daq' has no {told}")
+
+
+def test_a_simulated_board_has_the_channels_it_is_asked_for(whole):
+    asked = changed(whole, "boards.daq", second_sensor=True, element_sensor=True, cooler_w=300.0)
+    assert errors(changed(whole, "loops.tank.sensor", board="daq")) == []
+    board = load(asked).boards["daq"]
+    assert board.inputs == ("temperature", "temperature2", "element")
+    assert board.outputs == ("heater", "cooler")
+
+
+def test_a_driver_that_does_not_name_its_channels_is_believed(whole, foreign):
+    content = changed(whole, "boards.daq", kind="foreign", volume_l=None)
+    content["loops"]["tank"]["sensor"]["input"] = "anything"
+    content["service"] = {"accept_no_dead_man": True}
+    assert errors(content) == []
