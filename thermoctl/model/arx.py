@@ -195,11 +195,11 @@ class KnownGain:
 
     def target(self, temperature_c: float, u_past: Array) -> float:
         """Return y(t) - b u(t-1) in degC."""
-        return temperature_c - self.b_k * float(u_past[0])  # O21 (27)
+        return temperature_c - self.b_k * u_past.item(0)  # O21 (27)
 
     def temperature(self, value: float, u_past: Array) -> float:
         """Return y(t) in degC when ``a y(t-1)`` is `value`."""
-        return value + self.b_k * float(u_past[0])  # O21 (27)
+        return value + self.b_k * u_past.item(0)  # O21 (27)
 
     def pole(self, theta: Array, P: Array) -> tuple[float | None, float | None]:
         """Return a and its standard deviation."""

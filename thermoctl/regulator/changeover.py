@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True, slots=True)
-class Changeover:
+class Changeover(NamedTuple):
     """Which of two actuators was on last, and for how long neither has been.
 
     Parameters
@@ -24,8 +23,7 @@ class Changeover:
     def after(self, taken: float, interval_s: float) -> Changeover:
         """Return this after the signed power `taken` for `interval_s`."""
         if taken != 0.0:
-            side = math.copysign(1.0, taken)
-            return self if side == self.side and self.off_s == 0.0 else Changeover(side)
+            return Changeover(math.copysign(1.0, taken))
         return Changeover(self.side, self.off_s + interval_s)
 
     def waits(self, power: float, least_s: float) -> bool:

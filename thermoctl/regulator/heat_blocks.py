@@ -90,16 +90,15 @@ class Repeats:
         self._moved_k = 0.0
         self._run = self._seen = 0
         self._equal = self._turns = 0.0
-        self._limit = math.inf
 
     def observe(self, reading_c: float) -> bool:
         """Return whether the converter stands still; NaN is no reading, and says nothing."""
         if reading_c == self._last_c:
             self._run += 1
-            return self._run >= self._limit
+            return self._stands()
         if reading_c == reading_c:
             moved_k = reading_c - self._last_c
-            if self._run < self._limit:  # one that was a fault teaches nothing
+            if not self._stands():  # a run that was a fault teaches nothing
                 self._learn(moved_k * self._moved_k < 0.0)
             self._moved_k, self._last_c, self._run = moved_k, reading_c, 0
         return False
@@ -116,6 +115,11 @@ class Repeats:
         share = min(max(self.MEMORY, 1.0 / self._seen) * count, 1.0)
         self._equal += share * (self._run / count - self._equal)
         self._turns += share * (turned / count - self._turns)
+
+    def _stands(self) -> bool:
+        """Return whether the run is too long for a converter that is alive."""
+        if self._run < self.LEAST:  # nearly always
+            return False
         known = self._seen >= self.KNOWN_AFTER and self._turns >= self.TURNS_MIN
         odds = -math.log(min(self.MORE * self._equal + self.AND, 0.99))
-        self._limit = max(self.LEAST, math.ceil(_SURE / odds)) if known else math.inf
+        return known and self._run >= math.ceil(_SURE / odds)

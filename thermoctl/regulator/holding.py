@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 NEAR_K = 0.5
 """The plant is being held while its temperature is this close to the set point."""
@@ -11,8 +11,7 @@ KNOWN_AFTER_S = 60.0
 MEMORY_S = 120.0
 
 
-@dataclass(frozen=True, slots=True)
-class Holding:
+class Holding(NamedTuple):
     """Mean of the applied power while the plant was held without a break.
 
     Parameters

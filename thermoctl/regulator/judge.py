@@ -7,8 +7,8 @@ supervisor's business (`thermoctl.regulator.supervisor`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import NamedTuple
 
 from thermoctl.quantities import is_finite_number
 from thermoctl.regulator.limits import Limits
@@ -31,8 +31,7 @@ class Verdict(StrEnum):
     UNDER = "under"
 
 
-@dataclass(frozen=True, slots=True)
-class Judged:
+class Judged(NamedTuple):
     """A verdict, and what the judge has to remember for the next one.
 
     Parameters
@@ -77,23 +76,23 @@ def judge(
     quality = measurement.quality  # a plug-in's may be anything, even what has no hash
     circuit = _CIRCUIT.get(quality) if isinstance(quality, str) else None
     if circuit is not None:
-        return replace(memory, verdict=circuit)
+        return memory._replace(verdict=circuit)
     temperature_c = measurement.temperature_c
     if not is_finite_number(temperature_c):
-        return replace(memory, verdict=Verdict.MISSING)
+        return memory._replace(verdict=Verdict.MISSING)
     over_c, under_c = farthest(measurement, limits)
     over, under = over_c > limits.trip_above_c, under_c < limits.trip_below_c
     # Too hot is believed at once, from a stale reading as well: it only ever costs heat. So is too
     # cold where something cools.
     if over and limits.can_heat:
-        return replace(memory, verdict=Verdict.OVER)
+        return memory._replace(verdict=Verdict.OVER)
     if under and limits.can_cool:
-        return replace(memory, verdict=Verdict.UNDER)
+        return memory._replace(verdict=Verdict.UNDER)
     if quality is not Quality.GOOD:
-        return replace(memory, verdict=Verdict.MISSING)
+        return memory._replace(verdict=Verdict.MISSING)
     judged = _judge_step(memory, temperature_c, limits, limits.jump_k if jump_k is None else jump_k)
     if judged.verdict is Verdict.GOOD and (over or under):
-        return replace(judged, verdict=Verdict.OVER if over else Verdict.UNDER)
+        return judged._replace(verdict=Verdict.OVER if over else Verdict.UNDER)
     return judged
 
 

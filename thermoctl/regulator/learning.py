@@ -86,7 +86,7 @@ class Learning:
         return Situation(
             t_s,
             interval_s,
-            float(known.y_past_c[0]),
+            known.y_past_c.item(0),
             reference.value_c,
             applied,
             known.estimate,

@@ -21,6 +21,7 @@ class Mind:
 
     def __init__(self, controller: Controller) -> None:
         self.controller = controller
+        self.name = controller.name
         self.belief: Any = controller.start()
         self._foretells = controller if isinstance(controller, Foretelling) else None
         self.remembers = controller if isinstance(controller, Remembering) else None
@@ -31,11 +32,6 @@ class Mind:
             return False
         self.belief = self.remembers.start_from(remembered.model, remembered.age_s)
         return True
-
-    @property
-    def name(self) -> str:
-        """The name of the controller."""
-        return self.controller.name
 
     def surprise_k(self, situation: Situation) -> float:
         """Return reading minus what was expected, asked before `observe`; or NaN."""

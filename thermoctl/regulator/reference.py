@@ -8,8 +8,8 @@ it goes on.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from enum import Enum
+from typing import NamedTuple
 
 from thermoctl.errors import Refused
 from thermoctl.quantities import is_finite_number
@@ -36,8 +36,7 @@ def pace_in(mode: Mode, state: State) -> Pace:
     return Pace.RUNNING if state is State.RUN else Pace.HELD
 
 
-@dataclass(frozen=True, slots=True)
-class Reference:
+class Reference(NamedTuple):
     """What is followed now; `after` says what is followed next.
 
     Parameters
@@ -56,7 +55,7 @@ class Reference:
 
     def anew(self) -> Reference:
         """Return it as it stands before another request, even for the same set point."""
-        return replace(self, target_c=math.nan)
+        return self._replace(target_c=math.nan)
 
     def after(
         self, target_c: float, most_k_per_s: float, measured_c: float, seen_s: float, pace: Pace

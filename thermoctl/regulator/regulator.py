@@ -196,7 +196,7 @@ class Regulator:
         self._learning.observe(temperature_c, self._given(applied, interval_s), t_s)
         if self._watch is not None:
             self._watch.observe(t_s, interval_s, temperature_c, applied)
-        seen_s = self._limits.seen_s(interval_s)
+        seen_s = self._supervisor.seen_s
         self._learning.hold(temperature_c - self._wishes.setpoint_c, applied, seen_s)
         reference = self._wishes.approach(temperature_c, seen_s, self._supervisor.state)
         situation = self._learning.situation(t_s, interval_s, temperature_c, reference, applied)
@@ -212,11 +212,11 @@ class Regulator:
         self._steering.tell_remarks(t_s)
         self._command = self._supervisor.bound(asked, reason, t_s)
         steered = self._wishes.mode is Mode.AUTO and state is State.RUN
-        given = self._command.power - self._load.at(t_s)
-        self._shadow.decide(situation, given, seen_s, steered=steered)
+        load = self._load.at(t_s)
+        self._shadow.decide(situation, self._command.power - load, seen_s, steered=steered)
         self._notice_unknown_power(t_s)
         self._applied = None
-        return self._finish(measurement, situation, beliefs)
+        return self._finish(measurement, situation, beliefs, load)
 
     def applied(self, power: float) -> None:
         """Tell which power the actuator took; when never told, it took the command's."""
@@ -323,7 +323,9 @@ class Regulator:
             text = f"expected a power, got {self._unknown_powers} in a row that are none"
             self._supervisor.fail("output.nan", 11, text, t_s)
 
-    def _finish(self, measurement: Measurement, situation: Situation, beliefs: Beliefs) -> Step:
+    def _finish(
+        self, measurement: Measurement, situation: Situation, beliefs: Beliefs, load: float
+    ) -> Step:
         events: tuple[Event, ...] = ()
         if self._events:
             events = tuple(Event(situation.t_s, name, fields) for name, fields in self._events)
@@ -335,7 +337,7 @@ class Regulator:
             state=self._supervisor.state,
             setpoint_c=self._wishes.setpoint_c,
             reference_c=situation.setpoint_c,
-            load=self._load.at(situation.t_s),
+            load=load,
             command=self._command,
             controller=self._steering.name,
             estimate=self._learning.estimate,

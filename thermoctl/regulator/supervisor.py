@@ -64,7 +64,6 @@ class Supervisor:
         self._measurement = Measurement(math.nan)
         self._good_s = 0.0  # good readings without a break
         self._blind_s = 0.0  # time without a good reading that was not paid back yet
-        self._seen_s = 0.0  # what the last reading answers for
         self._tripping: Verdict | None = None
         self._tripped_lately = False
         self._opened_s: deque[float] = deque(maxlen=limits.OPEN_COUNT)
@@ -72,6 +71,8 @@ class Supervisor:
         self._last_power = 0.0
         self._taken = 0.0  # the last command, or what the actuators made of it
         self._changeover = Changeover()
+        self.seen_s = 0.0
+        """How much of the time since the last sample a good reading answers for."""
         self.master_released = True
         """Whether the loop above this one, if there is one, may give power itself."""
 
@@ -98,7 +99,7 @@ class Supervisor:
         before = self._judged.verdict
         self._judged = judge(self._judged, measurement, self.limits, jump_k)
         self._measurement = measurement
-        self._seen_s = seen_s = self.limits.seen_s(interval_s)
+        self.seen_s = seen_s = self.limits.seen_s(interval_s)
         verdict = self._judged.verdict
         if verdict is Verdict.GOOD:
             self._good_s += seen_s if before is Verdict.GOOD else 0.0
@@ -232,7 +233,7 @@ class Supervisor:
         The one place where limits hold. Falling is never slowed; nothing at all passes in SAFE,
         LATCHED or while a trip waits to be confirmed: safe is 0, for heater and cooler alike.
         """
-        self._changeover = self._changeover.after(self._taken, self._seen_s)
+        self._changeover = self._changeover.after(self._taken, self.seen_s)
         if self.state in (State.SAFE, State.LATCHED):
             power, reason = 0.0, self._why_off()
         elif self._tripping is not None:
@@ -259,7 +260,7 @@ class Supervisor:
         if self._changeover.waits(power, limits.changeover_s):
             return 0.0, "limit.changeover"
         most = max(math.copysign(self._last_power, self._last_power * power), 0.0)
-        most += limits.rise_per_s * self._seen_s
+        most += limits.rise_per_s * self.seen_s
         if abs(power) > most:
             return math.copysign(most, power), "limit.rate"
         return power, reason
