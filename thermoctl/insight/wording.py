@@ -15,9 +15,14 @@ def number(value: float, sd: float) -> str:
     if not 1e-9 < spread < 1e6 or abs(value) > 1e9:
         return f"{value:.4g} ± {spread:.2g}".replace("-", "−")
     decimals = max(0, 1 - math.floor(math.log10(spread)))
-    return f"{value:.{decimals}f} ± {spread:.{decimals}f}".replace("-", "−")
+    return f"{_signed(value, f'.{decimals}f')} ± {spread:.{decimals}f}"
 
 
 def plain(value: float, decimals: int = 0) -> str:
     """Return `value` with so many decimals, and a true minus."""
-    return f"{value:,.{decimals}f}".replace("-", "−") if math.isfinite(value) else UNKNOWN
+    return _signed(value, f",.{decimals}f") if math.isfinite(value) else UNKNOWN
+
+
+def _signed(value: float, digits: str) -> str:
+    """Return `value` with a true minus, and none before a zero."""
+    return f"{value:z{digits}}".replace("-", "−")
