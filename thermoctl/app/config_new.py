@@ -18,7 +18,7 @@ from thermoctl.app.settings import settings_in
 from thermoctl.app.tables import SensorTable
 from thermoctl.app.toml_text import toml_value
 from thermoctl.control.adaptive import Adaptive
-from thermoctl.errors import Refused
+from thermoctl.errors import ConfigError, Refused
 
 _WATER_J_PER_L_K = 4186.0
 _HEADROOM_K, _LEAST_HEADROOM_K = 20.0, 2.0
@@ -122,6 +122,10 @@ def _answers(interview: _Interview) -> Answers:
     heater_w = ask("heater_w", "Rated power of the heater, in W", 1500.0, _POSITIVE)
     setpoint_c = ask("setpoint_c", "Temperature to hold, in degC", 37.5, _WATER)
     trip_c = ask("trip_above_c", "Heater off for good above, in degC", *_trip(setpoint_c))
+    if not trip_c > setpoint_c:
+        raise ConfigError(
+            f"expected --trip-above-c above the set point of {setpoint_c:g} degC, got {trip_c:g}"
+        )
     mode = ask("mode", "Mode at the first start", "auto", click.Choice(["off", "auto"]))
     return Answers(
         kind=kind,
@@ -183,6 +187,7 @@ def _loop_lines(answers: Answers) -> list[str]:
         _line("setpoint_c", answers.setpoint_c, "degC to hold"),
         _line("trip_above_c", answers.trip_above_c, "heater off for good above this"),
         *_trip_below_lines(answers),
+        _line("heater_w", answers.heater_w, "so that watts and litres are told"),
         _line("setpoint_max_c", answers.setpoint_max_c, "no set point above this is accepted"),
         _line("period_s", 1.0, "one sample, one power, once a second"),
         _line("mode", answers.mode, "at the first start: off, manual or auto"),

@@ -266,8 +266,14 @@ def test_options_that_contradict_each_other_write_nothing(run, tmp_path):
     arguments = ("--yes", "--setpoint-c", 60, "--trip-above-c", 50, "-o", path)
     code, _, err = run("config", "new", *arguments)
     assert code == 78
-    assert "answers: loops.tank" in err
+    assert "expected --trip-above-c above the set point of 60 degC, got 50" in err
     assert not path.exists()
+
+
+def test_the_watts_that_were_answered_are_the_loop_s_too(run, tmp_path):
+    path = tmp_path / "new.toml"
+    assert run("config", "new", "--yes", "--heater-w", 800, "-o", path)[0] == 0
+    assert load(path).loops["tank"].heater_w == 800.0
 
 
 def test_a_board_without_a_dead_man_needs_the_promise_of_a_thermostat(run, foreign):
