@@ -52,6 +52,17 @@ def test_a_day_of_an_operator(daemon):
     assert not path_of(daemon).exists()
 
 
+def test_a_shell_is_offered_what_the_daemon_knows(daemon):
+    def offered(*words):
+        asked = {"_THERMOCTL_COMPLETE": "bash_complete", "COMP_WORDS": " ".join(words)}
+        daemon.environ |= asked | {"COMP_CWORD": str(len(words) - 1)}
+        return [line.partition(",")[2] for line in daemon.ask().stdout.splitlines()]
+
+    assert offered("thermoctl", "get", "temp") == ["temperature_c"]
+    assert offered("thermoctl", "mode", "off", "--loop", "t") == ["tank"]
+    assert offered("thermoctl", "controller", "s") == ["self-tuning-mv"]
+
+
 def test_refusals_say_what_was_expected_and_end_as_they_should(daemon):
     for words, code, text in [
         (("set", "99"), 1, "from 5 to 55"),

@@ -21,7 +21,7 @@ from thermoctl.app.options import (
     state_option,
 )
 from thermoctl.app.service_commands import settings_of, state_of_daemon
-from thermoctl.app.settings import Settings
+from thermoctl.app.settings import ETC, Settings
 from thermoctl.errors import NotPermitted, NotRunning, Refused, Unavailable
 from thermoctl.services.control_client import ControlClient
 from thermoctl.services.lock import DaemonLock
@@ -54,7 +54,7 @@ def alarms(
         return
     client = _daemon(configs, state, socket)
     if client is None:
-        settings = settings_of(configs)
+        settings = _left_settings(configs)
         latches = _latches(settings, state_of_daemon(settings, state))
         rows = [_row(name, latch) for name, (latch, _) in latches.items()]
     else:
@@ -100,7 +100,7 @@ def ack(
             rows = client.ask("ack", patience_s + _REPLY_S, loop=loop)["acknowledged"]
         _tell([row | {"acknowledged": True} for row in rows], "no alarm", as_json)
         return
-    settings = settings_of(configs)
+    settings = _left_settings(configs)
     if loop is not None:
         settings.loop(loop)
     directory = state_of_daemon(settings, state)
@@ -157,6 +157,13 @@ def _daemon(
         return client
     client.close()
     return None
+
+
+def _left_settings(configs: tuple[Path, ...]) -> Settings:
+    """Return the settings of a daemon that is gone; `NotRunning` where nobody names them."""
+    if not configs and not any(ETC.glob("*.toml")):
+        raise NotRunning("expected a running daemon, or -c FILE to see what one has left")
+    return settings_of(configs)
 
 
 # -- what a daemon left ----------------------------------------------------------------------------

@@ -130,7 +130,7 @@ def doctor(
 
 
 @click.command()
-@click.argument("kind", type=click.Choice(["thermodaq"]))
+@click.argument("kind", metavar="KIND", type=click.Choice(["thermodaq"]))
 @click.option(
     "--link",
     required=True,
@@ -151,6 +151,8 @@ def simulate(
     kind: str, link: Path, configs: tuple[Path, ...], seed: int, firmware: Any, duration: float
 ) -> None:
     """Put a simulated board of a KIND, wired to a simulated tank, behind a port.
+
+    KIND is thermodaq.
 
     A board of kind "simulated" in FILE says what the tank is like; else it is that of Özbek (2021).
     """

@@ -15,6 +15,7 @@ from typing import Any, Final, Protocol
 from thermoctl import __version__
 from thermoctl.app.cycle_record import cycle_record, iso_time
 from thermoctl.app.cycle_wire import details_of
+from thermoctl.app.plugins import BadOption
 from thermoctl.errors import ConfigError
 from thermoctl.insight import Insight
 from thermoctl.ports import Controller
@@ -245,6 +246,9 @@ class Clerk:
         """Return the law that a loop would have in its shadow."""
         try:
             return self._law(loop, kind)
+        except BadOption as error:
+            unknown = error.path == ("kind",)  # a word that was typed, no key of a file
+            raise CallError("bad_value", text=error.text if unknown else str(error)) from error
         except ConfigError as error:
             raise CallError("bad_value", text=str(error)) from error
 

@@ -17,6 +17,7 @@ from typing import Any, Final
 
 import click
 
+from thermoctl.app.completion import MODES, keys, laws, modes, shadows
 from thermoctl.app.endings import EXIT_ALARM, EXIT_FAILED
 from thermoctl.app.insight_words import insight_lines
 from thermoctl.app.live import numbers
@@ -37,7 +38,6 @@ _LATE_PERIODS: Final = 3.0
 _LATE_S: Final = 3.0
 _MINUTE_S: Final = 60.0
 _SAME_K: Final = 0.005  # closer than two decimals show
-_MODES: Final = ("off", "manual", "auto")
 _OVER_S: Final = 1.0  # a load of 0 ends the one before, however long it lasts itself
 _MINUTES: Final = {"min": 1.0, "h": 60.0}
 _REPLY_S: Final = 5.0  # beyond what the daemon itself gives its loop
@@ -71,15 +71,9 @@ def _power(text: str) -> float:
 
 def _mode(text: str) -> str:
     """Return the name of a mode that may be asked for; ``ValueError`` if it is none."""
-    if text not in _MODES:
-        raise ValueError(f"expected one of {', '.join(_MODES)}, got {text!r}")
+    if text not in MODES:
+        raise ValueError(f"expected one of {', '.join(MODES)}, got {text!r}")
     return text
-
-
-def _load(text: str) -> float:
-    """Return a load in [-1, 1], written as a power; ``ValueError`` if it is none."""
-    size = text.strip().removeprefix("-")
-    return -_power(size) if size != text.strip() else _power(size)
 
 
 def _rate(text: str) -> float:
@@ -92,7 +86,7 @@ def _rate(text: str) -> float:
 
 
 _TEMPERATURE, _POWER = Parsed("temperature", _temperature), Parsed("power", _power)
-_LOAD, _RATE = Parsed("load", _load), Parsed("rate", _rate)
+_RATE = Parsed("rate", _rate)
 
 
 @click.command(epilog=examples("thermoctl status", "thermoctl status --check --json"))
@@ -125,7 +119,7 @@ def _patience_s(period_s: float) -> float:
 
 
 @click.command(epilog=examples("thermoctl get temperature_c", "thermoctl get power --loop tank"))
-@click.argument("key")
+@click.argument("key", shell_complete=keys)
 @loop_option
 @socket_option
 @json_option
@@ -162,7 +156,7 @@ def set_command(
 
 
 @click.command(epilog=examples("thermoctl mode auto", "thermoctl mode off --loop tank"))
-@click.argument("mode", metavar="MODE", type=Parsed("mode", _mode))
+@click.argument("mode", metavar="MODE", type=Parsed("mode", _mode), shell_complete=modes)
 @loop_option
 @socket_option
 @json_option
@@ -193,7 +187,7 @@ def output(power: float, loop: str | None, socket: Path | None, as_json: bool) -
     context_settings={"ignore_unknown_options": True},  # -10% is a load
     epilog=examples("thermoctl load 20% --for 10m", "thermoctl load 0"),
 )
-@click.argument("power", metavar="POWER", type=_LOAD)
+@click.argument("power", type=_POWER)
 @click.option(
     "--for", "duration_s", type=Duration(), help="How long: 10m, 1h; a load of 0 needs none."
 )
@@ -210,14 +204,12 @@ def load(
         )
     duration_s = duration_s or _OVER_S
     told = _asked(socket, "load", loop=loop, power=power, duration_s=duration_s)
-    words = f"load {100.0 * told['power']:g} %" + (
-        f" for {told['duration_s']:g} s" if power else ""
-    )
-    _tell(told, as_json, lambda: words)
+    lasting = f" for {told['duration_s']:g} s" if power else ""
+    _tell(told, as_json, lambda: f"load {_plain(numbers.power(told['power']))}{lasting}")
 
 
 @click.command(epilog=examples("thermoctl controller self-tuning-mv"))
-@click.argument("name")
+@click.argument("name", shell_complete=shadows)
 @loop_option
 @socket_option
 @json_option
@@ -228,7 +220,7 @@ def controller(name: str, loop: str | None, socket: Path | None, as_json: bool) 
 
 
 @click.command(epilog=examples("thermoctl shadow pid", "thermoctl shadow none"))
-@click.argument("name")
+@click.argument("name", shell_complete=laws)
 @loop_option
 @socket_option
 @json_option

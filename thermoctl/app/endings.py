@@ -100,7 +100,8 @@ def words_of(error: BaseException) -> str:
     """Return what an error says: no number of the system, and usage in one line."""
     match error:
         case click.Abort():
-            return "interrupted"
+            ended = isinstance(error.__context__, EOFError)
+            return "expected an answer, got the end of input" if ended else "interrupted"
         case click.ClickException():
             return _usage(error)
         case OSError() if error.strerror:

@@ -30,6 +30,6 @@ def forget(loop: str, configs: tuple[Path, ...], state: Path | None) -> int:
     with DaemonLock(directory / "daemon.lock"):
         store = LearnedStore(directory)
         there = store.forget(name)
-    words = "forgotten" if there else "nothing was stored of it"
-    click.echo(f"{name} : {words}, {store.path_of(name)}")
+    path = store.path_of(name)
+    click.echo(f"{name} : forgotten; {path} is gone" if there else f"{name} : no model in {path}")
     return 0

@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 
 import click
 
+from thermoctl.app.completion import loops
+
 _UNITS_S = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -134,7 +136,9 @@ def socket_option(function: F) -> F:
 
 def loop_option(function: F) -> F:
     """Add ``--loop NAME``."""
-    return click.option("--loop", metavar="NAME", help="Only this loop.")(function)
+    return click.option("--loop", metavar="NAME", shell_complete=loops, help="Only this loop.")(
+        function
+    )
 
 
 def json_option(function: F) -> F:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import click
 import pytest
+from click.testing import CliRunner
 
 from thermoctl.app.cli import cli, main
 from thermoctl.app.endings import exit_code_of, prepare_streams, words_of
@@ -50,6 +51,31 @@ def test_an_error_of_the_system_is_told_by_file_and_words_without_its_number():
     assert words_of(OSError(28, "No space left on device")) == "No space left on device"
 
 
+def test_input_that_ends_before_an_answer_is_no_interruption():
+    @click.command()
+    def asking():
+        click.prompt("Volume")
+
+    result = CliRunner().invoke(asking, input="", standalone_mode=False)
+    assert words_of(result.exception) == "expected an answer, got the end of input"
+    assert words_of(click.Abort()) == "interrupted"
+
+
+def test_alarms_without_a_daemon_and_a_configuration_say_that_both_are_missing(
+    capsys, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    for module in ("alarm_commands", "settings"):
+        monkeypatch.setattr(f"thermoctl.app.{module}.ETC", tmp_path)
+    monkeypatch.setattr("thermoctl.services.control_place.SERVICE", tmp_path / "none.sock")
+    for command in (["alarms"], ["alarms", "ack"]):
+        code, out, err = ended(capsys, *command)
+        assert (code, out) == (3, "")
+        assert err == (
+            "thermoctl: expected a running daemon, or -c FILE to see what one has left\n"
+        )
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
@@ -62,7 +88,7 @@ def test_an_error_of_the_system_is_told_by_file_and_words_without_its_number():
         ("swim", "no such command 'swim'"),
         ("--sim --seed -1", "--seed: expected a whole number from 0 on, got -1"),
         ("--sim --seed x", "--seed: expected a whole number from 0 on, got 'x'"),
-        ("simulate nope", "{thermodaq}: expected one of thermodaq, got 'nope'"),
+        ("simulate nope", "KIND: expected one of thermodaq, got 'nope'"),
         (
             "reproduce",
             "expected a command, one of ozbek2021, bicer2017, lainiotis, experiment; see",

@@ -34,7 +34,7 @@ def test_what_was_learnt_is_gone_and_the_file_named(store):
 
 def test_forgetting_twice_says_that_there_was_nothing(store):
     call(store)
-    assert "nothing was stored" in call(store).output
+    assert "no model in" in call(store).output
 
 
 def test_while_a_daemon_runs_it_is_refused_and_nothing_is_lost(store):

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from thermoctl.app.clerk import Clerk
-from thermoctl.app.control_commands import _LOAD, _RATE, load, mode
+from thermoctl.app.control_commands import _POWER, _RATE, load, mode
 from thermoctl.services.control_protocol import Call, CallError, asking, parse
 from thermoctl.signals import Load, SetPoint
 
@@ -50,10 +50,10 @@ def test_a_rate_without_a_unit_that_is_known_is_refused(text):
 
 
 def test_a_load_may_be_negative():
-    assert _LOAD.convert("-10%", None, None) == pytest.approx(-0.1)
-    assert _LOAD.convert("0.2", None, None) == 0.2
+    assert _POWER.convert("-10%", None, None) == pytest.approx(-0.1)
+    assert _POWER.convert("0.2", None, None) == 0.2
     with pytest.raises(Exception, match="expected a power"):
-        _LOAD.convert("120%", None, None)
+        _POWER.convert("120%", None, None)
 
 
 def test_a_call_has_its_rate_and_its_duration():
