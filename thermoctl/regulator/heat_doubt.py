@@ -23,8 +23,9 @@ from thermoctl.regulator.heat_response import LAGS_S, Block, Gain, Heat
 LEAST_K, SDS, LAGS = 0.3, 5.0, 1.0
 """A sum is a doubt beyond these: in K, in standard deviations of a reading, in rises of a lag."""
 EXTRA_LAGS = 0.6
-CALM = 0.1
-"""Below this share of its limit a sum is nothing, and the model may follow."""
+CALM, CALM_SDS = 0.1, 2.0
+"""Below this share of its limit, or so many standard deviations of a reading, a sum is nothing, and
+the model may follow; were it to follow the quiet half of the noise only, it would drift."""
 HALF = 0.5
 """So much of the heat may be missing: the gain of a tank whose water was doubled."""
 FULL_SHARE = 0.02
@@ -33,6 +34,9 @@ EXTRA_GAINS, EXTRA_SHARE = 2.5, 0.3
 """So many times the gain, and so much of full power besides, is no stuck output."""
 MEMORY_S, MEMORY_LAGS = 300.0, 10.0
 """Memory of the quiet rates."""
+FOLLOWS_SDS = 4.0
+"""They follow a rise beyond what full power does by noise of so many standard deviations: cut off,
+noise would no longer add up to nothing."""
 CREPT, CREPT_S = 0.12, 100.0
 """A loss that has grown by so much of full power, for so long, while the reading has stood still: a
 sensor that shows the same for ever makes a controller add power little by little."""
@@ -92,7 +96,8 @@ class HeatDoubt:
 
     def calm(self, gain: Gain, sd_k: float) -> bool:
         """Return whether nothing is in doubt, so that gain and loss may be learnt."""
-        return max(self._missing_k, self._extra_k) < CALM * _limit_k(gain, sd_k, LAGS)
+        nothing_k = max(CALM * _limit_k(gain, sd_k, LAGS), CALM_SDS * sd_k)
+        return max(self._missing_k, self._extra_k) < nothing_k
 
     def cold(self, gain: Gain, sd_k: float) -> bool:
         """Return whether the reading fails to answer to the power."""
@@ -122,7 +127,8 @@ class HeatDoubt:
             extra_k = clamp(extra_k, -full_k, full_k) - EXTRA_SHARE * full_k
             self._extra_k = max(0.0, self._extra_k + extra_k)
         if follow and not jumped and self.calm(gain, block.sd_k):
-            rise_k = clamp(rise_k, -full_k, full_k)
+            most_k = full_k + FOLLOWS_SDS * block.sd_k
+            rise_k = clamp(rise_k, -most_k, most_k)
             self._follow(gain, heat_s, rise_k, span_s, now.reading_c)
         self._creep(gain, now.reading_c, block)
 

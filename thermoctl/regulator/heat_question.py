@@ -79,16 +79,19 @@ def contrast(rows: Sequence[Seen], sd_k: float) -> Contrast | None:
     return Contrast(mean, CAUTION * np.sqrt(variance / heats), left)
 
 
-def of_known(found: Contrast, known: Gain) -> tuple[Answer, Gain]:
-    """Return what `found` says of a known heater, and the gain it shows."""
+def of_known(found: Contrast, known: Gain, sure: float = SURE) -> tuple[Answer, Gain]:
+    """Return what `found` says of a known heater, and the gain it shows.
+
+    An answer has to differ from nothing by `sure` standard deviations.
+    """
     last = len(LAGS_S) - 1
     near = range(max(known.place - 1, 0), min(known.place + 1, last) + 1)
     shown = found.best(near)
-    if abs(shown.mean) > max(ANSWERS * known.mean, SURE * shown.sd):
+    if abs(shown.mean) > max(ANSWERS * known.mean, sure * shown.sd):
         return (Answer.HEATS if shown.mean > 0.0 else Answer.COOLS), shown
     small = [abs(found.mean[place]) < NOTHING * known.mean for place in near]
-    sure = [SURE * found.sd[place] < known.mean for place in near]
-    return (Answer.NOTHING if all(small) and all(sure) else Answer.OPEN), shown
+    seen = [SURE * found.sd[place] < known.mean for place in near]
+    return (Answer.NOTHING if all(small) and all(seen) else Answer.OPEN), shown
 
 
 def of_unknown(found: Contrast, weakest: float, slope: float) -> tuple[Answer, Gain]:

@@ -34,6 +34,9 @@ ALIKE = 4.0
 BLOCKS_LEAST = 4.0
 JUMP_K, JUMP_SDS, JUMP_GAINS = 0.5, 10.0, 3.0
 """A reading that moves by more in a block than these is no drift: somebody poured."""
+MIXES_S = 100.0
+"""So long after that nothing is learnt: what was poured is still being mixed, and the rebound of
+the reading would pass for a heater of thirty times the gain."""
 
 
 class Block(NamedTuple):
@@ -110,6 +113,9 @@ class _Path:
         self.line += span_s * self.slope
         self.off = self.heat_s - self.line
 
+    def stand(self) -> None:
+        self.line, self.off = self.heat_s, 0.0
+
     def follow(self, by: float, by_per_s: float) -> None:
         self.line += by * self.off
         self.slope += by_per_s * self.off
@@ -146,7 +152,7 @@ class HeatResponse:
         for path in self._paths:
             path.begin_again()
         self.heat_s: Heat = (0.0,) * len(self._paths)
-        self._line_c = self._slope = 0.0
+        self._line_c = self._slope = self._mixes_s = 0.0
         self._last_c = math.nan
         self.jumped = False
 
@@ -154,6 +160,7 @@ class HeatResponse:
         """Take one more block in, and learn from it if that is wanted."""
         span_s, reading_c, paths = block.span_s, block.reading_c, self._paths
         self._arrive(span_s, block.power)
+        self._mixes_s -= span_s
         self.jumped = False
         if math.isnan(self._last_c):
             self._line_c = self._last_c = reading_c
@@ -165,8 +172,11 @@ class HeatResponse:
             return
         moved_k, self._last_c = reading_c - self._last_c, reading_c
         if abs(moved_k) > self._most_k(block):
-            self.jumped = True
-            self._line_c += moved_k
+            self.jumped, self._mixes_s = True, MIXES_S
+        if self._mixes_s > 0.0:
+            self._line_c = reading_c
+            for path in paths:
+                path.stand()
             return
         rest_k, fade = reading_c - self._line_c, self._fade
         by, by_per_s = 1.0 - fade * fade, (1.0 - fade) ** 2 / span_s

@@ -55,6 +55,11 @@ LATELY_S = 1800.0
 ROWS = 450
 """Blocks that are remembered: half an hour at a second's period."""
 
+LIKELY = 1.0
+"""After so long noise is what hides the answer, and the likelier of two is taken: a heater that
+warms by as many standard deviations is not condemned."""
+
+_LIKELY_TEXT = "{:.0f} s without power do not show it surely, but a gain of {:.2g} K/s is likely"
 _WILD_TEXT = "the reading fell faster than any heater can make it, so the cut says nothing"
 _NOT_SEEN = Gain(math.nan, math.nan, 0)
 _FAULTS = {"heater.no_response": 23, "heater.reversed": 3, "heater.stuck_on": 24}
@@ -274,12 +279,20 @@ class HeaterWatch:
         elif answer is not Answer.OPEN:
             self._refuse(answer, cut, shown, asked_s, t_s)
         elif known is not None and asked_s > _longest_s(known, block.sd_k):
-            self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
+            answer, shown = self._answer(cut, block.sd_k, now, sure=LIKELY)
+            if answer is Answer.HEATS:
+                self._emit("heater.answered", text=_LIKELY_TEXT.format(asked_s, shown.mean))
+                self._doubt.trust(known)
+                self._go_on()
+            else:
+                self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
         elif known is None and asked_s > UNKNOWN_LAGS * lag_s:
             self._patience_s *= 2.0
             self._go_on()
 
-    def _answer(self, cut: _Cut, sd_k: float, now: Seen) -> tuple[Answer, Gain]:
+    def _answer(
+        self, cut: _Cut, sd_k: float, now: Seen, sure: float = heat_question.SURE
+    ) -> tuple[Answer, Gain]:
         """Return what the reading says so far, and the gain it shows.
 
         An answer counts only if the reading turned the same way when the power was cut.
@@ -290,7 +303,7 @@ class HeaterWatch:
             return Answer.OPEN, _NOT_SEEN
         known = self._known
         if known is not None:
-            answer, shown = heat_question.of_known(found, known)
+            answer, shown = heat_question.of_known(found, known, sure)
             recent_s = max(known.lag_s, BEFORE_S)
         else:
             weakest, recent_s = self._check.weakest_k_per_s, 2.0 * BEFORE_S
@@ -300,7 +313,9 @@ class HeaterWatch:
             if answer is Answer.OPEN and whole is not None:
                 answer, shown = heat_question.of_unknown(whole, weakest, drift)
         before = heat_question.slope(rows, cut.at_s - recent_s, cut.at_s)
-        after = heat_question.slope(rows, max(now.t_s - recent_s, cut.at_s))
+        less_sd_k = sd_k if sure < heat_question.SURE else 0.0
+        from_s = max(now.t_s - recent_s, cut.at_s)
+        after = heat_question.slope(rows, from_s, less_sd_k=less_sd_k)
         turned = {Answer.HEATS: after < before, Answer.COOLS: after > before}
         return (answer if turned.get(answer, True) else Answer.OPEN), shown
 

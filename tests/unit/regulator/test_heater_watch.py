@@ -145,6 +145,42 @@ def test_a_litre_of_cold_water_is_no_fault():
     assert plant.names() == []
 
 
+def holding(plant, seed):
+    """Return a power that holds 37.5 degC by proportion and integral, and is not quite steady."""
+    rng, held = np.random.default_rng(seed), deque([0.2], maxlen=1)
+
+    def power(_t_s):
+        e = 37.5 - plant.water_c
+        held.append(min(max(held[0] + 5e-4 * e, 0.0), 1.0))
+        return min(max(held[0] + 0.2 * e + 0.1 * rng.standard_normal(), 0.0), 1.0)
+
+    return power
+
+
+def test_much_noise_raises_no_doubt():
+    plant, rng = known(seed=5), np.random.default_rng(105)
+    plant.noise_k = 0.4
+
+    def power(_t_s):
+        return min(max(0.25 + 0.1 * rng.standard_normal() - 0.2 * (plant.water_c - 37.5), 0.0), 1.0)
+
+    plant.run(3000, power)
+    assert plant.names() == []
+
+
+def test_a_heater_that_noise_hides_is_asked_and_not_condemned():
+    asked = 0
+    for seed in (0, 1, 2):
+        plant = known(seed=seed)
+        plant.water_c, plant.noise_k = 37.5, 0.8
+        plant.run(2500, holding(plant, seed))
+        plant.loss = 0.022  # a draught
+        plant.run(2500, holding(plant, seed))
+        asked += plant.names().count("heater.questioned")
+        assert set(plant.names()) <= {"heater.questioned", "heater.answered"}, seed
+    assert asked
+
+
 def test_a_sensor_that_has_fallen_out_ends_the_heat():
     plant = known()
     fell_s, there_c = plant.t_s, plant.water_c
@@ -180,6 +216,24 @@ def test_gain_and_lag_are_learnt_from_powers_that_move_whatever_drifts():
     gain = response.gain
     assert gain.lag_s == 45.0
     assert abs(gain.mean - 0.02) < 3.0 * gain.sd < 0.004
+
+
+@pytest.mark.parametrize(("dip_k", "mixes_s", "falls_s"), [(1.5, 10.0, 3.0), (1.0, 20.0, 4.0)])
+def test_water_that_mixes_under_full_power_is_no_gain(dip_k, mixes_s, falls_s):
+    rng, response = np.random.default_rng(1), HeatResponse()
+    first = second = 0.0
+    y = 37.5
+    for n in range(1100):
+        t_s, power = 4.0 * (n - 1000), 0.15 + 0.03 * rng.standard_normal() if n < 1000 else 1.0
+        first += -math.expm1(-0.4) * (power - first)
+        second += -math.expm1(-0.4) * (first - second)
+        y += 4.0 * 3e-4 * (second - 0.15)
+        shown = y + 0.01 * rng.standard_normal()
+        if t_s >= 0.0:  # a cold jug falls past the sensor, and is stirred in
+            shown -= 0.2 * -math.expm1(-t_s / falls_s)
+            shown -= dip_k * (math.exp(-t_s / mixes_s) - math.exp(-t_s / falls_s))
+        response.observe(Block(4.0, power, shown, 0.01), learn=True)
+        assert response.gain is None or response.gain.mean < max(1e-3, 5.0 * response.gain.sd), n
 
 
 def rows(beta, drift, n=40, place=2, seed=3, bend=0.0):
