@@ -24,7 +24,7 @@ from thermoctl.app.tables import LoopTable, Options
 from thermoctl.errors import ConfigError, Refused, Unavailable
 from thermoctl.plant.parameters import TankParameters
 from thermoctl.regulator import Plan
-from thermoctl.studies.compare.baselines import BASELINES, require
+from thermoctl.studies.compare.baselines import BASELINES, options_for, require
 from thermoctl.studies.compare.figure import MOST_DRAWN, draw_comparison
 from thermoctl.studies.compare.plants import FLEETS, Plant, Usage, plant
 from thermoctl.studies.compare.present import as_json as lines_as_json
@@ -36,7 +36,7 @@ from thermoctl.studies.compare.summary import Line, summarise
 from thermoctl.studies.figure import FORMATS
 
 RESULTS, FIGURE = "results.jsonl", "compare"
-USUAL = ("adaptive", "self-tuning-mv:reference_time_s=60", "on-off", "simple-pid")
+USUAL = ("adaptive", "self-tuning-mv:reference_time_s=60", "simple-pid", "marlin-mpc", "on-off")
 """Who takes part when nobody is named; only those of them that are installed."""
 
 _SEEDS, _QUICK_SEEDS = 20, 4
@@ -113,14 +113,17 @@ def _plan(table: LoopTable, where: Plant, *, nameplate: bool, fitted: bool) -> P
     kind = table.controller.kind
     if kind not in BASELINES:
         return plan_for(table)
-    law = plugins.build(BASELINES[kind], table.controller.options)
+    ordered = options_for(kind, where, nameplate=nameplate)
+    law = plugins.build(BASELINES[kind], {**ordered, **table.controller.options})
     stand_in = table.model_copy(update={"controller": Options(kind="on-off"), "shadow": None})
     return replace(plan_for(stand_in), controller=law)
 
 
 def _fitted(table: LoopTable, usage: Usage) -> LoopTable:
     """Return the loop as `usage` has it; what that leaves open is as it was."""
+    check = table.heater_check
     own = {
+        "heater_check": check.model_copy(update={"enabled": check.enabled and usage.heater_check}),
         "setpoint_c": usage.held_c,
         "setpoint_max_c": usage.setpoint_max_c,
         "trip_above_c": usage.trip_above_c,

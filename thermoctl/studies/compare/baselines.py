@@ -1,7 +1,8 @@
 """Controllers from elsewhere, tuned for the rig as it was ordered.
 
 simple-pid, a package with many users, with gains by the SIMC rules of `thermoctl.control.simc`
-from what is known of the nominal rig.
+from what is known of the nominal rig, and a law in the manner of Marlin's, which is in
+`thermoctl.studies.compare.marlin`.
 """
 
 from __future__ import annotations
@@ -9,39 +10,53 @@ from __future__ import annotations
 import importlib.util
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 from thermoctl.control import simc as rules
 from thermoctl.errors import Unavailable
+from thermoctl.plant.lab import LabParameters
 from thermoctl.plant.parameters import WATER_J_PER_KG_K, TankParameters
 from thermoctl.ports import Situation
 from thermoctl.quantities import is_finite_number
 from thermoctl.signals import Beliefs
+from thermoctl.studies.compare.labs import lag_s
+from thermoctl.studies.compare.marlin import MarlinMpc, options, tuned
+from thermoctl.studies.compare.plants import FLEETS, LAB_HELD_C, Plant
 
 if TYPE_CHECKING:
     from simple_pid import PID
 
 
-def simc(tank: TankParameters, period_s: float = 1.0, *, derivative: bool = False) -> rules.Gains:
-    """Return the gains SIMC gives for a tank that is known as its maker knows it.
+def simc(
+    ordered: TankParameters | LabParameters, period_s: float = 1.0, *, derivative: bool = False
+) -> rules.Gains:
+    """Return the gains SIMC gives for a plant that is known as its maker knows it.
 
-    The water integrates; element and sheath are lags; transport and half a sample are dead time.
+    The water of a tank integrates, its element and sheath are lags; transport and half a sample are
+    dead time. Heater and sensor of a lab are lags.
 
     Parameters
     ----------
-    tank : TankParameters
-        The tank.
+    ordered : TankParameters or LabParameters
+        The plant.
     period_s : float
         Time between two samples.
     derivative : bool
         Cancel the larger lag as well.
     """
-    slope_k_per_s = tank.element.rated_w / (tank.vessel.water_kg * WATER_J_PER_KG_K)
-    lags_s = sorted((tank.element.lag_s, tank.probe.lag_s), reverse=True)
-    dead_s = tank.probe.transport_s + 0.5 * period_s
-    process = rules.Process(slope_k_per_s, dead_s, (math.inf, *lags_s))
-    return rules.simc(process, derivative=derivative)
+    return rules.simc(_process(ordered, 0.5 * period_s), derivative=derivative)
+
+
+def _process(ordered: TankParameters | LabParameters, late_s: float) -> rules.Process:
+    """Return what the rules have to know of a plant; `late_s` is the dead time of sampling."""
+    if isinstance(ordered, LabParameters):
+        slope_k_per_s = ordered.first_w / ordered.heat_j_per_k
+        lags_s = (lag_s(ordered, LAB_HELD_C), ordered.sensor_lag_s)
+        return rules.Process(slope_k_per_s, late_s, lags_s)
+    slope_k_per_s = ordered.element.rated_w / (ordered.vessel.water_kg * WATER_J_PER_KG_K)
+    lags = sorted((ordered.element.lag_s, ordered.probe.lag_s), reverse=True)
+    return rules.Process(slope_k_per_s, ordered.probe.transport_s + late_s, (math.inf, *lags))
 
 
 def _default(place: str) -> float:
@@ -109,13 +124,40 @@ class SimplePid:
         return {}
 
 
-BASELINES: Mapping[str, type] = {"simple-pid": SimplePid}
+BASELINES: Mapping[str, type] = {"simple-pid": SimplePid, "marlin-mpc": MarlinMpc}
 """Controllers that exist only to be compared with, by kind."""
+
+
+def options_for(kind: str, where: Plant, *, nameplate: bool = False) -> dict[str, float]:
+    """Return the options of a baseline on a plant, from what was ordered alone.
+
+    All plants of a fleet were ordered alike, so that nobody is tuned to the one it meets.
+
+    Parameters
+    ----------
+    kind : str
+        A key of `BASELINES`.
+    where : Plant
+        The plant.
+    nameplate : bool
+        Tell a model the litres and watts of this very tank.
+    """
+    ordered = FLEETS[where.fleet].ordered
+    if kind == SimplePid.name:
+        gains = simc(ordered)
+        return {"Kp": gains.Kp, "Ki": gains.Ki}
+    rig = tuned(ordered, where.held_c)
+    if nameplate and isinstance(where.parameters, TankParameters):
+        vessel, element = where.parameters.vessel, where.parameters.element
+        block_j_per_k = vessel.water_kg * WATER_J_PER_KG_K
+        rig = replace(rig, heater_w=element.rated_w, block_j_per_k=block_j_per_k)
+    return options(rig)
+
 
 _MODULES: Mapping[str, str] = {"simple-pid": "simple_pid"}
 
 
 def require(kind: str) -> None:
     """Raise `Unavailable`, naming the package, where a baseline cannot run."""
-    if importlib.util.find_spec(_MODULES[kind]) is None:
+    if kind in _MODULES and importlib.util.find_spec(_MODULES[kind]) is None:
         raise Unavailable(f"{kind} is not installed: pip install {kind}")

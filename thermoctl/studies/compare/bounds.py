@@ -60,7 +60,7 @@ def _approach(
         return {}
     stepped_k = sum(each.amount or 0.0 for each in scenario.happenings if each.name == SETPOINT)
     target_c = plant.held_c + stepped_k
-    way = swiftest(known, begin, target_c)
+    way = swiftest(known, begin, target_c, plant.band_k, plant.band_k)
     if way is None:
         return {"settled_s": None}
     found: dict[str, float | None] = {"settled_s": way.settled_s}

@@ -86,6 +86,17 @@ def lab_rest(parameters: LabParameters, target_c: float) -> LabAtRest:
     return LabAtRest(heat, power)
 
 
+def lag_s(parameters: LabParameters, target_c: float) -> float:
+    """Return the time constant of the first heater about `target_c`, alone."""
+    heat = lab_rest(parameters, target_c).heat
+
+    def rate(off_k: float) -> float:
+        moved = heat._replace(first_c=target_c + off_k)
+        return lab.rates(parameters, moved, (0.0, 0.0), parameters.room_c).first_c
+
+    return 2.0 / (rate(-1.0) - rate(1.0))
+
+
 def linear_lab(
     parameters: LabParameters,
     acquisition: AcquisitionParameters,

@@ -16,13 +16,22 @@ from thermoctl.plant.lab import LabParameters, lab_specimen
 from thermoctl.plant.parameters import WATER_J_PER_KG_K, TankParameters
 from thermoctl.plant.tolerances import specimen
 from thermoctl.studies.compare.linear import rest
-from thermoctl.studies.compare.scenarios import HELD_C
+from thermoctl.studies.compare.scenarios import BAND_K, HELD_C
 
 TOLERANCES = 0.1
 """Spread between specimens of one order: 10 %."""
 
+RIG, LAB = TankParameters(), LabParameters()
+"""The plants as they are ordered."""
+
 ACQUISITION = AcquisitionParameters(bits=12)
 """The converter of every tank: bursts of 32 conversions over two mains periods."""
+
+LAB_HELD_C = 50.0
+"""Set point of a lab: about half of its power."""
+
+LAB_BAND_K = 0.15
+"""A lab has settled within this: ten times what nobody can avoid on it, as for a tank."""
 
 LAB_ACQUISITION = AcquisitionParameters(
     bits=10, reference_v=5.0, conversions=10, burst_s=0.001, noise_v=2e-3, pickup_v=0.0
@@ -52,6 +61,9 @@ class Usage:
         Highest set point, and the trip; None: as the configuration has them.
     gain_k_per_s, heater_w : float or None
         Rise at full power, and that power; None: as the configuration has them.
+    heater_check : bool
+        False: the heater is not asked. One whose loss is as quick as a lab's is asked again and
+        again, since what it gives goes to the room, and every question cuts the power.
     """
 
     held_c: float = HELD_C
@@ -59,6 +71,7 @@ class Usage:
     trip_above_c: float | None = None
     gain_k_per_s: float | None = None
     heater_w: float | None = None
+    heater_check: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +92,8 @@ class Plant:
         How many times slower than the rig it warms up and settles, at least 1.
     usage : Usage
         What is configured for it.
+    band_k : float
+        Settled means within this of the set point.
     """
 
     fleet: str
@@ -87,6 +102,7 @@ class Plant:
     acquisition: AcquisitionParameters = ACQUISITION
     pace: float = 1.0
     usage: Usage = Usage()
+    band_k: float = BAND_K
 
     @property
     def held_c(self) -> float:
@@ -124,6 +140,10 @@ class Fleet:
         The converter of its plants.
     usage : Usage
         What is configured for all of them alike.
+    ordered : TankParameters or LabParameters
+        What whoever built them was asked for: all that a baseline's constants may come from.
+    band_k : float
+        Settled means within this of the set point.
     """
 
     number: int
@@ -133,10 +153,12 @@ class Fleet:
     paced: bool = True
     acquisition: AcquisitionParameters = ACQUISITION
     usage: Usage = Usage()
+    ordered: TankParameters | LabParameters = RIG
+    band_k: float = BAND_K
 
 
 def _rig(rng: Generator) -> TankParameters:
-    return specimen(TankParameters(), rng, TOLERANCES)
+    return specimen(RIG, rng, TOLERANCES)
 
 
 def _sizes(rng: Generator) -> TankParameters:
@@ -152,17 +174,16 @@ def _sizes(rng: Generator) -> TankParameters:
 def _lags(rng: Generator) -> TankParameters:
     """Return the rig with a slow or quick sensor, and any element."""
     sensor_s, element_s = _between(rng, 1.0, 60.0), _between(rng, 4.0, 45.0)
-    tank = TankParameters()
     lagging = replace(
-        tank,
-        element=replace(tank.element, lag_s=element_s),
-        probe=replace(tank.probe, lag_s=sensor_s),
+        RIG,
+        element=replace(RIG.element, lag_s=element_s),
+        probe=replace(RIG.probe, lag_s=sensor_s),
     )
     return specimen(lagging, rng, TOLERANCES)
 
 
 def _lab(rng: Generator) -> LabParameters:
-    return lab_specimen(LabParameters(), rng, TOLERANCES)
+    return lab_specimen(LAB, rng, TOLERANCES)
 
 
 def _between(rng: Generator, low: float, high: float) -> float:
@@ -202,7 +223,16 @@ FLEETS: Mapping[str, Fleet] = {
         _lab,
         paced=False,
         acquisition=LAB_ACQUISITION,
-        usage=Usage(50.0, setpoint_max_c=70.0, trip_above_c=80.0, gain_k_per_s=0.5, heater_w=1.0),
+        usage=Usage(
+            held_c=LAB_HELD_C,
+            setpoint_max_c=70.0,
+            trip_above_c=80.0,
+            gain_k_per_s=0.5,
+            heater_w=1.0,
+            heater_check=False,
+        ),
+        ordered=LAB,
+        band_k=LAB_BAND_K,
     ),
 }
 """Every fleet by name."""
@@ -223,7 +253,7 @@ def plant(fleet: str, seed: int) -> Plant:
     pace = 1.0
     if kind.paced and isinstance(parameters, TankParameters):
         pace = _pace(parameters)
-    return Plant(fleet, seed, parameters, kind.acquisition, pace, kind.usage)
+    return Plant(fleet, seed, parameters, kind.acquisition, pace, kind.usage, kind.band_k)
 
 
 def _pace(tank: TankParameters) -> float:

@@ -17,7 +17,7 @@ from thermoctl.quantities import Array
 from thermoctl.regulator import Plan, Regulator
 from thermoctl.signals import Mode, RawSample, SetPoint, State, Step
 from thermoctl.studies.compare.plants import PACE_S, Plant
-from thermoctl.studies.compare.scenarios import SETPOINT, Happening, Scenario
+from thermoctl.studies.compare.scenarios import BAND_K, SETPOINT, Happening, Scenario
 from thermoctl.studies.compare.stand import stand_for
 
 _BROKEN = ("controller.failed", "estimator.failed", "output.nan")
@@ -37,6 +37,8 @@ class Trace:
         What the hardware took, from this sample to the next.
     failure : str or None
         Why the regulator gave up at any time of the run, before the stretch included.
+    band_k : float
+        Settled means within this of the set point.
     """
 
     t_s: Array
@@ -44,6 +46,7 @@ class Trace:
     setpoint_c: Array
     power: Array
     failure: str | None = None
+    band_k: float = BAND_K
 
 
 def play(plan: Plan, plant: Plant, scenario: Scenario) -> Trace:
@@ -75,7 +78,7 @@ def play(plan: Plan, plant: Plant, scenario: Scenario) -> Trace:
         rows[sample] = bench.live(sample * period_s, happening)
     t_s = period_s * np.arange(end - begin, dtype=np.float64)
     true_c, setpoint_c, power = rows[begin:].T
-    return Trace(t_s, true_c, setpoint_c, power, bench.failure)
+    return Trace(t_s, true_c, setpoint_c, power, bench.failure, plant.band_k)
 
 
 def _settling_s(plant: Plant, scenario: Scenario) -> float:

@@ -31,7 +31,7 @@ _DECISIVE = (
     "control",
     "plant",
     "regulator",
-    *(f"studies/compare/{name}.py" for name in ("baselines", "play", "score", "stand")),
+    *(f"studies/compare/{name}.py" for name in ("baselines", "marlin", "play", "score", "stand")),
 )
 """Source that decides what comes of a run: after a change to it, it is another program."""
 

@@ -11,6 +11,9 @@ SETPOINT = "setpoint"
 HELD_C = 37.5
 """Set point of O21, which every scenario on a tank begins with."""
 
+BAND_K = 0.1
+"""A tank has settled within this of the set point: ten times what nobody can avoid on the rig."""
+
 
 @dataclass(frozen=True, slots=True)
 class Happening:

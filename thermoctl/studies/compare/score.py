@@ -1,4 +1,4 @@
-"""The measures of a run, on the true mean temperature of the water."""
+"""The measures of a run, on the true temperature of what is controlled."""
 
 from __future__ import annotations
 
@@ -8,9 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermoctl.studies.compare.play import Trace
-
-BAND_K = 0.1
-"""Settled means within this of the set point, for good."""
 
 STAY = 0.2
 """For good means for the last fifth of the stretch at least."""
@@ -51,7 +48,7 @@ def _settled_s(trace: Trace) -> float | None:
 
     For good is until the end, and that for a fifth of the stretch: a swing may end inside.
     """
-    outside = np.flatnonzero(np.abs(trace.true_c - trace.setpoint_c) > BAND_K)
+    outside = np.flatnonzero(np.abs(trace.true_c - trace.setpoint_c) > trace.band_k)
     if not outside.size:
         return 0.0
     inside = int(outside[-1]) + 1
