@@ -118,6 +118,11 @@ class Report:
                 f"Band     not reached: {plan.middle_c:g} °C, where the test signal begins, needs a"
                 " longer --duration, or a set point nearer to where the loop is"
             )
+        elif self._stayed_above():
+            lines.append(
+                f"Band     not reached: no reading fell to {plan.top_c:g} °C, and a heater cannot"
+                " lead there; choose a set point above where the loop rests"
+            )
         if self.tuning is None:
             return [*lines, f"Nothing was learnt: {self.why_nothing}"]
         lines += tuning_lines(self.tuning)
@@ -126,6 +131,10 @@ class Report:
         if toml is not None:
             lines += ["", "Suggested for the configuration:", "", *toml.splitlines()]
         return lines
+
+    def _stayed_above(self) -> bool:
+        """Return whether it was warmer than the band all the while, so that nothing was given."""
+        return self.record is not None and bool(self.record.y.min() > self.excitation.top_c)
 
     def _toml(self) -> str | None:
         keys = self.suggestion

@@ -6,6 +6,7 @@ is opened and no global state of matplotlib is changed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -157,14 +158,17 @@ def label(axes: Any, y: float, text: str, hue: str) -> None:
     )
 
 
-def spread_out(places: Sequence[float], gap: float) -> list[float]:
-    """Return `places` moved apart by `gap` or more, in their order."""
+def spread_out(places: Sequence[float], gap: float, low: float = -math.inf) -> list[float]:
+    """Return `places` moved apart by `gap` or more, in their order, none below `low`."""
     order = np.argsort(places, kind="stable")
     apart = np.array(places, dtype=np.float64)[order]
     for index in range(1, len(apart)):
         apart[index] = max(apart[index], apart[index - 1] + gap)
     moved = np.empty_like(apart)
-    moved[order] = apart - 0.5 * (apart[-1] - max(places)) if len(apart) else apart
+    if len(apart):
+        apart -= 0.5 * (apart[-1] - max(places))
+        apart += max(0.0, low - apart[0])
+    moved[order] = apart
     return [float(place) for place in moved]
 
 

@@ -30,7 +30,7 @@ def draw_posterior(panel: Any, weighing: Weighing, record: Record, unit_s: float
             record.t_s[weighing.index] / unit_s, weighing.trace[:, place], stride * longest
         )
         panel.plot(*house.envelope(t, p), color=hue, linestyle=dash)
-    apart = house.spread_out(ends, _LABEL_GAP)
+    apart = house.spread_out(ends, _LABEL_GAP, low=0.0)
     for place, y, hue in zip(places, apart, house.HUES, strict=False):
         house.label(panel, y, order_text(weighing.orders[place]), hue)
     panel.axhline(SETTLED, color=house.ALLOWED, linewidth=0.8, zorder=0)

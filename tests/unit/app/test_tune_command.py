@@ -154,6 +154,17 @@ def test_a_band_that_was_not_reached_is_told_and_nothing_suggested():
     assert (report["reached"], report["plant"], report["suggestion"]) == (False, None, None)
 
 
+def test_a_loop_that_is_warmer_than_the_band_is_told_why_nothing_was_heard(tmp_path):
+    config = Path("warm.toml")
+    config.write_text(
+        '[boards.daq]\nkind = "simulated"\nambient_c = 30.0\nice_kg = 0.0\n'
+        + BOARD[BOARD.index("[loops.tank]") :].replace("37.5", "20.0")
+    )
+    code, printed, _ = run("--sim", "-c", config, "--duration", "5m", "--out", "o")
+    assert code == 0
+    assert "Band     not reached: no reading fell to 20 °C" in printed
+
+
 def test_a_loop_of_structure_arx_is_suggested_its_order(tmp_path):
     config = Path("arx.toml")
     config.write_text(BOARD + '[loops.tank.model]\nstructure = "arx"\n')

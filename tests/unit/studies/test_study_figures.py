@@ -212,6 +212,11 @@ def test_labels_are_moved_apart_in_their_order():
     assert np.diff(np.sort(moved)).min() >= 0.5 - 1e-12
 
 
+def test_labels_that_crowd_at_the_foot_of_a_panel_stay_above_it():
+    assert house.spread_out([0.04] * 4, 0.12, low=0.0) == pytest.approx([0.0, 0.12, 0.24, 0.36])
+    assert house.spread_out([0.9, 0.8], 0.01, low=0.0) == [0.9, 0.8]
+
+
 @pytest.mark.parametrize(
     ("duration_s", "unit"),
     [(100, (1.0, "s")), (1800, (60.0, "min")), (36_000, (3600.0, "h")), (2e6, (86400.0, "d"))],
