@@ -8,12 +8,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
 from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import Any
 
-from thermoctl.signals import Cycle, Estimate
+from thermoctl.signals import Cycle, Estimate, Feasible, ShadowScore
+
+_ENCODER = json.JSONEncoder(allow_nan=False)
 
 
 def finite(value: float | None) -> float | None:
@@ -29,7 +30,7 @@ def iso_time(utc_s: float) -> str | None:
 
 def as_line(cycle: Cycle, beside: Mapping[str, Any] = MappingProxyType({})) -> str:
     """Return the cycle, and keys found beside it, as one JSON object."""
-    return json.dumps({**cycle_record(cycle), **beside}, allow_nan=False)
+    return _ENCODER.encode({**cycle_record(cycle), **beside})
 
 
 def cycle_record(cycle: Cycle) -> dict[str, Any]:
@@ -59,13 +60,18 @@ def cycle_record(cycle: Cycle) -> dict[str, Any]:
         "model_origin": step.origin,
         "shadow": step.shadow,
         "shadow_power": step.shadow_power,
-        "shadow_score": None if step.shadow_score is None else asdict(step.shadow_score),
-        "feasible": {name: finite(value) for name, value in asdict(step.feasible).items()},
+        "shadow_score": None if step.shadow_score is None else _flat(step.shadow_score),
+        "feasible": {name: finite(value) for name, value in _flat(step.feasible).items()},
         "tick_us": round(cycle.tick_us, 1),
         "late_s": round(cycle.late_s, 6),
         "alarms": [alarm.code for alarm in step.alarms],
         **{name: value for name, value in cycle.truth.items() if name == "true_temperature_c"},
     }
+
+
+def _flat(told: Feasible | ShadowScore) -> dict[str, Any]:
+    """Return the numbers of `told` by name; `asdict` would copy each of them as if it were deep."""
+    return {name: getattr(told, name) for name in told.__slots__}
 
 
 def _innovation(estimate: Estimate) -> float:

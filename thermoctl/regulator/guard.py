@@ -56,7 +56,7 @@ class Guard:
     def call(
         self, code: str, t_s: float, otherwise: T, law: Callable[[*Given], T], *given: *Given
     ) -> T:
-        """Return what `law` makes of what is `given`, or `otherwise` after the fault `code`."""
+        """Return what `law` makes of what is `given`; `otherwise` after the fault `code`."""
         try:
             return law(*given)
         except Exception as error:  # noqa: BLE001 - the boundary to third-party laws

@@ -65,6 +65,10 @@ class Loop:
         self.wirings = outer_first(wirings)
         self._named = {each.name: each for each in self.wirings}
         self.boards = tuple({id(b): b for w in self.wirings for b in w.boards}.values())
+        self._outputs = {
+            id(b): tuple((w, output) for w in self.wirings for output in w.on(b))
+            for b in self.boards
+        }
         self._clock, self._period_s = clock, period_s
         self._publish, self._completed = publish, completed
         self._requests: queue.SimpleQueue[Asked] = queue.SimpleQueue()
@@ -220,7 +224,7 @@ class Loop:
         """Give every board its drives in one exchange; return the accepted power by loop."""
         taken: dict[tuple[str, Output], float] = {}
         for board in self.boards:
-            wired = [(w, output) for w in self.wirings for output in w.on(board)]
+            wired = self._outputs[id(board)]
             if not wired or board.board is None:
                 continue
             now_s = self._clock.now_s()
@@ -305,7 +309,7 @@ class Loop:
         return confirmed
 
     def _off(self, board: Connection) -> bool:
-        drives = {output.channel: 0.0 for w in self.wirings for output in w.on(board)}
+        drives = {output.channel: 0.0 for _, output in self._outputs[id(board)]}
         if drives and board.board is not None:
             try:
                 board.write(drives, EXCHANGE_S, self._clock.now_s() + EXCHANGE_S)
@@ -365,6 +369,8 @@ class Loop:
 
     def take_events(self) -> tuple[Event, ...]:
         """Return what was reported since the last cycle was published."""
+        if not self._events:
+            return ()
         now_s = self._clock.now_s()
         taken = [self._events.popleft() for _ in range(len(self._events))]
         return tuple(Event(now_s, name, fields) for name, fields in taken)

@@ -14,9 +14,9 @@ from thermoctl.runtime.connection import Connection
 from thermoctl.runtime.lead import Lead
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Output:
-    """A channel of a board, and the law of what hangs on it."""
+    """A channel of a board, and the law of what hangs on it; equal to itself alone."""
 
     board: Connection
     channel: str
