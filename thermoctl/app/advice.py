@@ -21,6 +21,8 @@ ADVICE: Final[Mapping[str, str]] = {
     "output.nan": "the control law asked for no number: the journal tells which one",
     "output.readback": "the output gives another power than was commanded: look at relay or triac",
     "output.refused": "the board did not take a power: look at cable, port and supply",
+    "plant.driven": "something else moves the water: does the heater give power although it is "
+    "off, or is the room warmer than the set point?",
     "sensor.disagree": "the two sensors tell different temperatures: does one hang in the air?",
     "sensor.first_lost": "the first of two sensors is gone: look at its cable and plug",
     "sensor.missing": "no reading arrives: look at the board, and at the cable to it",

@@ -40,7 +40,12 @@ STEADY = 12
 """So many stretches in a row must say the same before the alarm comes or goes."""
 
 UNREACHABLE = "setpoint.unreachable"
+DRIVEN = "plant.driven"
 _PRIORITY = 2
+NONE = 0.02
+"""Power below this is none."""
+BEYOND_K = 0.5
+"""What is no farther beyond the set point is regulation."""
 
 
 class Gathered(NamedTuple):
@@ -71,6 +76,21 @@ class Wanted:
     ramp_s: float = 0.0
 
 
+class Standing:
+    """Whether something has been said of the plant long enough; slower to end than to begin."""
+
+    def __init__(self) -> None:
+        self.stands, self._contrary = False, 0
+
+    def weigh(self, sds: float, *, counts: bool) -> bool:
+        """Take in one more stretch, by how many deviations it is so; return whether it is news."""
+        stood, far = self.stands, sds > (OVER_SDS if self.stands else SURE_SDS)
+        self._contrary = 0 if far is stood else self._contrary + 1
+        if self._contrary >= STEADY or not counts:
+            self.stands, self._contrary = far and counts, 0
+        return self.stands is not stood
+
+
 class Feasibility:
     """Keeps the balance of heat of a loop; says when a set point is out of reach.
 
@@ -94,7 +114,7 @@ class Feasibility:
         self._lag_s = LAG_GUESS_S
         self._heat = 0.0  # power that has reached the sensor
         self._reading_c = math.nan
-        self._stands, self._contrary = False, 0
+        self._standings = {UNREACHABLE: Standing(), DRIVEN: Standing()}
         self.known = Feasible()
 
     @property
@@ -198,19 +218,23 @@ class Feasibility:
         return Known(wanted.ramp_s, LAG_DOUBT * lag_s) if slower else arrival
 
     def _tell(self, belief: HeatBelief, wanted: Wanted, t_s: float) -> None:
-        """Raise the alarm, or clear it; slower to end than to begin."""
-        stood = self._stands
-        full = self._heat >= FULL * wanted.power_max
-        far = _missing_sds(belief, wanted, full) > (OVER_SDS if stood else SURE_SDS)
-        self._contrary = 0 if far is stood else self._contrary + 1
-        if self._contrary >= STEADY or wanted.mode is not Mode.AUTO:
-            self._stands, self._contrary = far and wanted.mode is Mode.AUTO, 0
-        if self._stands:
-            text = _words(self.known, belief, wanted)
-            if self._alarms.set(Alarm(UNREACHABLE, None, _PRIORITY, t_s, text)) and not stood:
-                self._emit(UNREACHABLE, text=text)
-        elif stood:
-            self._alarms.clear(UNREACHABLE)
+        """Raise the alarms, or clear them."""
+        full, none = self._heat >= FULL * wanted.power_max, self._heat <= NONE
+        texts = {
+            UNREACHABLE: (_missing_sds(belief, wanted, full), _words(self.known, belief, wanted)),
+            DRIVEN: (
+                _driven_sds(belief, wanted) if none else 0.0,
+                _driven_words(belief, wanted),
+            ),
+        }
+        for code, (sds, text) in texts.items():
+            standing = self._standings[code]
+            news = standing.weigh(sds, counts=wanted.mode is Mode.AUTO)
+            if standing.stands:
+                if self._alarms.set(Alarm(code, None, _PRIORITY, t_s, text)) and news:
+                    self._emit(code, text=text)
+            elif news:
+                self._alarms.clear(code)
 
 
 def _within(known: Known, sd_most: float) -> Known:
@@ -235,6 +259,29 @@ def _missing_sds(belief: HeatBelief, wanted: Wanted, full: bool) -> float:
         return slow if full else 0.0
     there = heat_loss.spare(belief, wanted.setpoint_c, wanted.power_max, straight=True)
     return max(slow, -towards * there.mean / there.sd)
+
+
+def _driven_sds(belief: HeatBelief, wanted: Wanted) -> float:
+    """Return by how many standard deviations a plant without power leaves the set point behind.
+
+    Something else heats what should be heated: the air, or an output that is stuck at too little
+    for `heater.stuck_on`.
+    """
+    here_c = float(belief.x[heat_loss.T])
+    beyond_k = math.copysign(1.0, belief.gain) * (here_c - wanted.setpoint_c)
+    if not belief.gain_known or beyond_k < BEYOND_K:
+        return 0.0
+    here = heat_loss.spare(belief, here_c, 0.0)
+    return math.copysign(1.0, belief.gain) * here.mean / here.sd
+
+
+def _driven_words(belief: HeatBelief, wanted: Wanted) -> str:
+    """Return what was expected of a plant without power, and what came."""
+    minute_k = 60.0 * heat_loss.spare(belief, float(belief.x[heat_loss.T]), 0.0).mean
+    return (
+        f"expected the plant to come to {wanted.setpoint_c:g} degC without power, it moves by "
+        f"{minute_k:+.2f} K a minute at {belief.x[heat_loss.T]:.1f} degC"
+    )
 
 
 def _words(known: Feasible, belief: HeatBelief, wanted: Wanted) -> str:

@@ -65,6 +65,7 @@ _BY_LEVEL: Final = {
         "model.ignored",
         "orders.failed",
         "plant.drift",
+        "plant.driven",
         "sensor.disagree",
         "sensor.first_lost",
         "sensor.missing",

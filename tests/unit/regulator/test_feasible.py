@@ -10,6 +10,7 @@ from thermoctl.app.settings import load
 from thermoctl.signals import Measurement, Mode, SetPoint
 
 UNREACHABLE = "setpoint.unreachable"
+DRIVEN = "plant.driven"
 
 
 class Tank:
@@ -20,6 +21,7 @@ class Tank:
         self.heater_w, self.loss_w_per_k = heater_w, loss_w_per_k
         self.water_c, self.element, self.sensor_c = water_c, 0.0, water_c
         self.t_s, self.power = 0.0, 0.0
+        self.shorted = None
         self.rng = np.random.default_rng(seed)
         loop = {"setpoint_c": 80.0, "trip_above_c": 95.0, "mode": "auto", **keys}
         self.regulator = regulator_for(load({"loops": {"tank": loop}}))
@@ -30,7 +32,8 @@ class Tank:
         """Advance and return the last step."""
         h = self.period_s
         for _ in range(round(seconds / h)):
-            self.element += (1.0 - math.exp(-h / 12.0)) * (self.power - self.element)
+            given = self.power if self.shorted is None else self.shorted
+            self.element += (1.0 - math.exp(-h / 12.0)) * (given - self.element)
             loss_w = self.loss_w_per_k * (self.water_c - 22.0)
             self.water_c += h * (self.heater_w * self.element - loss_w) / self.per_k
             self.sensor_c += (1.0 - math.exp(-h / 5.0)) * (self.water_c - self.sensor_c)
@@ -126,3 +129,23 @@ def test_a_cooler_is_told_the_lowest_temperature():
     assert codes(step) == [UNREACHABLE]
     assert "at least" in step.alarms[0].text
     assert abs(step.feasible.highest_c - (22.0 - 30.0)) < 3.0 * step.feasible.highest_sd_k
+
+
+@pytest.mark.parametrize(("stuck", "after_s"), [(0.25, 1500), (0.35, 600)])
+def test_heat_that_nobody_asked_for_is_told(stuck, after_s):
+    check = {"enabled": False}  # it looks for an output that is stuck at much more
+    tank = Tank(8.0, 1500.0, 12.0, setpoint_c=40.0, heater_check=check)
+    assert codes(tank.run(1500)) == []
+    tank.shorted = stuck
+    step = tank.run(after_s)
+    assert step.command.power == 0.0
+    assert codes(step) == [DRIVEN]
+    assert "come to 40 degC without power, it moves by +" in step.alarms[0].text
+
+
+def test_water_that_cools_down_to_its_set_point_or_rests_above_it_is_not_driven():
+    tank = Tank(2.0, 300.0, 4.0, setpoint_c=40.0)
+    tank.run(900)
+    tank.regulator.request(SetPoint(15.0))
+    for _ in range(20):
+        assert codes(tank.run(300)) == []

@@ -80,6 +80,7 @@ _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
     "output.refused": (Mark.WARNING, ("Output refused: {text}", "Output refused")),
     "plant.changed": (Mark.CHANGE, ("{text}", "The plant has changed")),
     "plant.drift": (Mark.WARNING, ("{text}", "The plant has drifted")),
+    "plant.driven": (Mark.WARNING, ("Driven by something else: {text}", "Something else heats")),
     "request.refused": (Mark.WARNING, ("Refused: {why}", "Request refused")),
     "sensor.missing": (Mark.WARNING, ("No sample: {text}", "No sample from the sensor")),
     "sensor.open": (Mark.WARNING, ("Sensor open: {text}", "Sensor open")),
