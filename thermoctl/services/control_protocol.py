@@ -196,7 +196,7 @@ def _text(name: str, value: object) -> str:
 def _shown(value: object) -> str:
     """Return what came, short enough to be repeated; a reply must not be longer than a call."""
     text = value if isinstance(value, str) else repr(value)
-    text = text if text.isprintable() else repr(text)
+    text = text if text and text.isprintable() else repr(text)
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
 
 

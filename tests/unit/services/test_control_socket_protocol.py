@@ -12,6 +12,7 @@ from thermoctl.services.control_protocol import (
     CallError,
     asking,
     denied,
+    error_words,
     granted,
     parse,
     told,
@@ -66,6 +67,12 @@ def test_what_is_no_call_is_refused_by_name(line, code):
         parse(line)
     assert refused.value.code == code
     assert {"expected", "got"} < refused.value.error.keys()
+
+
+def test_an_empty_word_is_shown_as_one():
+    with pytest.raises(CallError) as refused:
+        parse(call(do="mode", mode=""))
+    assert error_words(refused.value.error).endswith("got ''")
 
 
 KEYS = st.sampled_from(["v", "id", "do", "loop", "key"]) | st.text(max_size=5)

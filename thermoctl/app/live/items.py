@@ -127,6 +127,8 @@ def gain(bench: Bench) -> Item:
     digits = numbers.number(None if believed.gain is None else 60.0 * believed.gain, 2)
     if digits == numbers.UNKNOWN:
         return _unknown("Gain", "Gain", bench.no_belief())
+    if believed.gain is not None and 2.0 * (believed.gain_sd or 0.0) > abs(believed.gain):
+        return _unknown("Gain", "Gain", "not known yet")  # it might as well cool
     spark = bench.spark(trend.GAIN, 240.0 * (believed.gain_sd or 0.0))
     error = _error(_twice(believed.gain_sd, 60.0), 2) or "given"
     return Item("Gain", "Gain", digits, error, "K/min", spark, Role.BLUE)

@@ -112,6 +112,18 @@ def test_nobody_who_looks_is_the_panel_of_the_controller_alone(
     assert not any(row.startswith("Lag") for row in rows)
 
 
+@pytest.mark.parametrize(
+    ("sd", "told"), [(0.15, "Gain – not known yet"), (0.004, "Gain 2.40 ± 0.48")]
+)
+def test_a_gain_that_might_as_well_be_none_is_not_known(
+    model: LiveModel, make_cycle: MakeCycle, sd: float, told: str
+) -> None:
+    cycle = make_cycle(0.0)
+    vague = replace(cycle.step.beliefs, gain=0.04, gain_sd=sd)
+    rows = spaced(fed(model, replace(cycle, step=replace(cycle.step, beliefs=vague)), None))
+    assert any(row.startswith(told) for row in rows)
+
+
 def test_nothing_told_yet_is_a_dash_and_no_empty_place(
     model: LiveModel, make_cycle: MakeCycle
 ) -> None:
