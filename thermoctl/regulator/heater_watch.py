@@ -44,6 +44,9 @@ LONGEST_S, LONGEST_LAGS, LONGEST_SDS = 240.0, 12.0, 20.0
 water by so many standard deviations of a reading."""
 UNKNOWN_LAGS = 3.0
 """An unknown one gets another chance after so many of the longest lags, with twice the heat."""
+TRIALS_MOST = 8.0
+"""But not when it had so many times the first heat, 15 minutes in all, and is not likely to heat: a
+converter that stands still, or noise, would hide the answer of any plant until the water boils."""
 CHANGED, AT_ONCE = 0.7, 3.0
 """A gain below this share of the one that was known is the new one; so is one as far above it, but
 no more than so many times the old one at once."""
@@ -287,6 +290,12 @@ class HeaterWatch:
             else:
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
         elif known is None and asked_s > UNKNOWN_LAGS * lag_s:
+            if self._patience_s >= TRIALS_MOST * self._check.first_heat_s and not (
+                shown.mean > LIKELY * shown.sd
+            ):
+                self._failed_s = self._t_s  # asked often enough: nothing is left to be tried
+                self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
+                return
             self._patience_s *= 2.0
             self._go_on()
 

@@ -126,6 +126,28 @@ def test_a_heater_that_was_never_known_has_a_minute_of_full_power(does, code):
     assert plant.names()[-1] == code
 
 
+@pytest.mark.parametrize("noise_k", [0.0, 0.3])
+def test_a_reading_that_never_answers_ends_the_heat_after_a_quarter_of_an_hour(noise_k):
+    plant, given = Plant(noise_k=noise_k), deque([0.0], maxlen=1)
+    plant.shows = lambda _: 25.0
+
+    def full(_t_s):
+        given.append(given[0] + plant.applied)
+        return 1.0
+
+    plant.run(4000, full)
+    assert plant.supervisor.state is State.LATCHED
+    assert plant.names()[-1] == "heater.no_response"
+    assert given[0] < 960.0
+
+
+@pytest.mark.parametrize(("gain", "noise_k"), [(2e-3, 0.3), (3e-4, 0.05)])
+def test_a_weak_heater_in_noise_is_given_its_time(gain, noise_k):
+    for seed in range(2):
+        plant = Plant(gain, 0.2 * gain, 20.0, seed, noise_k).run(4000, 1.0)
+        assert set(plant.names()) <= {"heater.questioned", "heater.answered"}, seed
+
+
 def test_a_heater_at_its_limit_is_asked_once_and_goes_on():
     plant = Plant(gain=0.01, loss=0.01).run(7200, 1.0)
     assert plant.names() == ["heater.questioned", "heater.answered"]
