@@ -249,9 +249,15 @@ def _check(text: str) -> None:
 
 
 def _write(out: Path, text: str, force: bool) -> None:
-    """Write `text`; without `force` never over a file that came meanwhile."""
+    """Write `text`; without `force` never over a file that came meanwhile, nor half of it."""
     try:
-        with out.open("w" if force else "x", encoding="utf-8") as stream:
-            stream.write(text)
+        stream = out.open("w" if force else "x", encoding="utf-8")
     except FileExistsError as error:
         raise Refused(_TAKEN.format(out)) from error
+    try:
+        with stream:
+            stream.write(text)
+    except OSError as error:  # a disk that is full
+        if not force:
+            out.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror, str(out)) from error

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +115,7 @@ def save(figure: Any, path: Path) -> Path:
     ValueError
         If the suffix is neither.
     OSError
-        If it cannot be written; it names the file.
+        If it cannot be written; it names the file, and leaves no half of it.
     """
     kind = path.suffix.lower()
     if kind not in FORMATS:
@@ -129,6 +129,9 @@ def save(figure: Any, path: Path) -> Path:
         # A disk that is full is noticed while writing, when nobody remembers the name.
         if error.filename is None:
             error.filename = str(path)
+        with suppress(OSError):
+            if path.is_file():  # half a figure
+                path.unlink()
         raise
     return path
 

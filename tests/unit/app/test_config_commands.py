@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import resource
 import tomllib
 from pathlib import Path
 
@@ -267,6 +268,23 @@ def test_options_that_contradict_each_other_write_nothing(run, tmp_path):
     code, _, err = run("config", "new", *arguments)
     assert code == 78
     assert "expected --trip-above-c above the set point of 60 degC, got 50" in err
+    assert not path.exists()
+
+
+@pytest.fixture
+def short_files():
+    """Let no file grow beyond a hundred bytes, as on a disk that is full."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.usefixtures("short_files")
+def test_a_file_that_cannot_be_written_whole_is_named_and_not_left_behind(run, tmp_path):
+    path = tmp_path / "new.toml"
+    code, _, err = run("config", "new", "--yes", "-o", path)
+    assert (code, err) == (1, f"thermoctl: {path}: File too large\n")
     assert not path.exists()
 
 

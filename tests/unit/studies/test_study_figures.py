@@ -1,5 +1,7 @@
 import builtins
+import errno
 import math
+import os
 import re
 
 import numpy as np
@@ -179,6 +181,19 @@ def test_only_png_and_svg_are_written(tmp_path):
     run = made_run()
     with pytest.raises(ValueError, match=r"\.png or \.svg, got 'e\.pdf'"):
         draw_experiment(run, measure(run), "title", [tmp_path / "e.pdf"])
+
+
+def test_a_disk_that_fills_up_is_told_with_the_file_and_leaves_no_half_of_it(tmp_path):
+    class Torn:
+        def savefig(self, path, **keys):
+            path.write_bytes(b"\x89PNG")
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    path = tmp_path / "e.png"
+    with pytest.raises(OSError, match="No space left") as told:
+        house.save(Torn(), path)
+    assert told.value.filename == str(path)
+    assert not path.exists()
 
 
 def test_a_thinned_line_keeps_its_peaks_and_its_holes():
