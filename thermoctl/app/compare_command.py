@@ -163,7 +163,8 @@ def _name(what: str, known: Sequence[str]) -> Parsed:
     "texts",
     multiple=True,
     metavar="KIND[:OPTION=VALUE,...]",
-    help="Once for each; as in TOML. The usual ones that are installed when not given.",
+    help="Once for each; options as in TOML. When not given, those that are installed of "
+    + ", ".join(USUAL),
 )
 @click.option(
     "-c",

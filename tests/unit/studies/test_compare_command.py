@@ -116,3 +116,24 @@ def test_json_is_one_object_and_the_second_time_nothing_is_run(tmp_path):
     assert content["conditions"]["seeds"] == 1
     assert [each["measure"] for each in content["lines"]] == ["overshoot_k", "settled_s"]
     assert len((tmp_path / RESULTS).read_text().splitlines()) == 2
+
+
+def test_a_run_on_a_lab_is_kept_with_its_bound_and_not_made_twice(tmp_path):
+    arguments = ["--controller", "marlin-mpc", "--fleet", "tclab", *BRIEF, "--out", tmp_path]
+    first, second = run(*arguments, "--json"), run(*arguments, "--json")
+    content = json.loads(second.stdout)
+    assert content == json.loads(first.stdout)
+    assert {each["fleet"] for each in content["lines"]} == {"tclab"}
+    (settled,) = (each for each in content["lines"] if each["measure"] == "settled_s")
+    assert 40.0 < settled["bound"] < 120.0
+    assert len((tmp_path / RESULTS).read_text().splitlines()) == 2
+
+
+def test_a_loop_of_ones_own_that_may_not_be_as_warm_as_a_lab_is_refused(tmp_path):
+    text = profile("aquarium").read_text(encoding="utf-8")
+    tepid = tmp_path / "tepid.toml"
+    tepid.write_text(text.replace("setpoint_max_c = 55.0", "setpoint_max_c = 51.0"))
+    own = ["--controller", "on-off", "-c", tepid, "--fleet", "tclab", "--out", tmp_path / "out"]
+    done = run(*own)
+    assert isinstance(done.exception, ConfigError)
+    assert "52.5" in str(done.exception)

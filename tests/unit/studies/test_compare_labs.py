@@ -22,6 +22,7 @@ from thermoctl.studies.compare.play import play
 from thermoctl.studies.compare.riccati import lyapunov, regulated, riccati
 from thermoctl.studies.compare.run import Contender, finished, jobs_for
 from thermoctl.studies.compare.scenarios import SCENARIOS, Happening
+from thermoctl.studies.compare.score import measured
 from thermoctl.studies.compare.stand import stand_for
 from thermoctl.studies.compare.store import Store
 from thermoctl.studies.compare.swift import swiftest
@@ -198,6 +199,23 @@ def test_a_lab_is_given_the_limits_and_the_gain_of_its_data_sheet():
     assert plan.identifier.structure.b_k == pytest.approx(LAB.first_w / LAB.heat_j_per_k)
     rig = contender("on-off", TABLE).plan_for(plant("rig", 3))
     assert rig.limits.trip_above_c == TABLE.trip_above_c
+
+
+def test_the_heater_of_a_lab_is_not_asked_and_that_of_a_rig_is():
+    law = contender("on-off", TABLE)
+    assert law.plan_for(plant("tclab", 3)).heater_check is None
+    assert law.plan_for(plant("rig", 3)).heater_check is not None
+
+
+def test_a_lab_has_settled_within_its_own_band_in_runs_and_in_bounds():
+    where = plant("tclab", 3)
+    trace = play(held(0.5), where, replace(SCENARIOS["warm-up"], judged_s=5.0))
+    assert trace.band_k == where.band_k == 0.15
+    off_k = np.where(np.arange(6) < 2, 0.16, 0.14)
+    assert measured(replace(trace, true_c=trace.setpoint_c - off_k))["settled_s"] == 2.0
+    known, begin = KnownLab(where.parameters), lab.start(where.parameters)
+    best = swiftest(known, begin, 50.0, band_k=0.15, peak_k=0.15)
+    assert bounds(where, SCENARIOS["warm-up"])["settled_s"] == best.settled_s
 
 
 def test_a_loop_of_the_users_own_is_left_as_it_is():
