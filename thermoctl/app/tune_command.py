@@ -26,7 +26,7 @@ from thermoctl.app.options import (
 )
 from thermoctl.app.order_options import candidates_option, require_auto
 from thermoctl.app.parts import plan_for
-from thermoctl.app.results import make_folder, print_json, say
+from thermoctl.app.results import console, make_folder, print_json, say
 from thermoctl.app.settings import Settings, default_files, load_all
 from thermoctl.app.sim import bench_settings, default_profile, stand_ins
 from thermoctl.app.tables import LoopTable
@@ -39,9 +39,10 @@ from thermoctl.model.arx import Arx
 from thermoctl.studies.excitation import Excitation
 from thermoctl.studies.laws import parse_order_or_auto
 from thermoctl.studies.orders import USUAL
+from thermoctl.studies.present import print_lines
 from thermoctl.studies.record import RecordError
 from thermoctl.studies.tuning import needed, tune
-from thermoctl.studies.words import ascii_only, duration, is_utf8
+from thermoctl.studies.words import duration
 
 LONGEST_S: Final = 172_800.0
 """Longest run: two days; all of it is held in memory."""
@@ -268,9 +269,7 @@ def _tell(report: Report, asked: _Asked) -> None:
         if asked.as_json:
             print_json(report.as_json(asked.out))
         else:
-            spell = str if is_utf8(sys.stdout.encoding) else ascii_only
-            for line in report.lines():
-                click.echo(spell(line))
+            print_lines(console(), report.lines())
     finally:
         say(f"{path} written" for path in report.write(asked.out))
 

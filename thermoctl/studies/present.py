@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +29,28 @@ Spelling = Callable[[str], str]
 def spelling(console: Console) -> Spelling:
     """Return how words are spelt on `console`."""
     return str if is_utf8(console.encoding) else ascii_only
+
+
+def print_lines(console: Console, lines: Iterable[str]) -> None:
+    """Print lines; on a terminal one that is too long goes on below where its text begins."""
+    spell = spelling(console)
+    for line in lines:
+        shown = _folded(spell(line), console.width) if console.is_terminal else spell(line)
+        console.print(shown, style="none", markup=False, highlight=False, soft_wrap=True)
+
+
+def _folded(line: str, width: int) -> str:
+    """Return `line` in rows of at most `width` where words allow it."""
+    name = re.match(r"\S*\s{2,}", line)
+    margin = len(name[0]) if name is not None and 2 * len(name[0]) < width else 0
+    rows = textwrap.wrap(
+        line,
+        width,
+        subsequent_indent=" " * margin,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return "\n".join(rows)
 
 
 def replay_json(result: Replay) -> dict[str, Any]:
@@ -72,15 +96,13 @@ def _finite(value: Any) -> Any:
 def print_replay(console: Console, result: Replay) -> None:
     """Print what was read, what was done to it, and how every law did."""
     spell = spelling(console)
-    for line in (*_about_record(result.record), *_about_conditions(result)):
-        console.print(spell(line), style="none", markup=False, soft_wrap=True)
+    print_lines(console, (*_about_record(result.record), *_about_conditions(result)))
     if result.weighing:
         print_orders(console, result.weighing)
     print_table(console, _prediction_table(result, spell))
     print_table(console, *_parameter_tables(result, spell))
     console.print()
-    for line in _warnings(result):
-        console.print(spell(line), markup=False, soft_wrap=True)
+    print_lines(console, _warnings(result))
 
 
 def print_orders(console: Console, weighing: Weighing) -> None:

@@ -14,6 +14,7 @@ from thermoctl.studies.laws import parse_law
 from thermoctl.studies.present import (
     experiment_json,
     print_experiment,
+    print_lines,
     print_replay,
     replay_json,
 )
@@ -39,6 +40,20 @@ def printed(show, *what, width=120, file=io.StringIO):
     console = Console(file=file(), width=width)
     show(console, *what)
     return console.file.getvalue()
+
+
+def test_a_long_line_goes_on_below_its_text_on_a_terminal_and_stays_whole_in_a_file():
+    lines = ["Record   run.csv: 1,201 samples, every 1 s, 20 min", "", "a   b"]
+    terminal = Console(file=io.StringIO(), width=30, force_terminal=True)
+    print_lines(terminal, lines)
+    assert terminal.file.getvalue().splitlines() == [
+        "Record   run.csv: 1,201",
+        "         samples, every 1 s,",
+        "         20 min",
+        "",
+        "a   b",
+    ]
+    assert printed(print_lines, lines, width=30).splitlines() == lines
 
 
 @pytest.mark.parametrize("width", [20, 80, 200])

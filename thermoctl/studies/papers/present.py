@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console
 
 from thermoctl.studies.papers.study import Cell, Column, Outcome, Study
-from thermoctl.studies.present import empty_table, print_table, spelling
+from thermoctl.studies.present import empty_table, print_lines, print_table, spelling
 from thermoctl.studies.words import counted
 
 
@@ -30,8 +30,7 @@ def outcome_json(study: Study, outcome: Outcome, files: Sequence[Path]) -> dict[
 def print_outcome(console: Console, study: Study, outcome: Outcome) -> None:
     """Print the title of `study`, how much it has seen, and its table."""
     spell = spelling(console)
-    for line in (study.title, f"{runs(outcome)}, seed {study.seed}"):
-        console.print(spell(line), style="none", markup=False, soft_wrap=True)
+    print_lines(console, (study.title, f"{runs(outcome)}, seed {study.seed}"))
     table = empty_table(spell, *(column.heading for column in study.columns))
     for place, column in enumerate(study.columns):
         if all(isinstance(row[column.key], str) for row in outcome.table):
