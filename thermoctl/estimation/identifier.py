@@ -130,10 +130,11 @@ class Identifier:
 
 def pushed(past: Array, newest: float) -> Array:
     """Return `past` with `newest` in front and the oldest gone."""
-    if len(past) == 0:
+    n = len(past)
+    if n == 0:
         return past
-    pushed = np.empty_like(past)
+    pushed = np.empty(n)
     pushed[0] = newest
-    if len(past) > 1:
+    if n > 1:
         pushed[1:] = past[:-1]
     return frozen(pushed)

@@ -116,12 +116,12 @@ def _judge_step(memory: Judged, temperature_c: float, limits: Limits, jump_k: fl
     step_k = abs(temperature_c - memory.last_good_c)
     steps_k = (*memory.steps_k[1 - _STEPS :], step_k)
     if step_k <= limits.jump_k:  # nearly always, and no threshold is lower
-        return Judged(Verdict.GOOD, temperature_c, steps_k=steps_k)
+        return Judged(Verdict.GOOD, temperature_c, math.nan, 0, steps_k)
     widened_k = min(_STEP_FACTOR * memory.usual_step_k, _THRESHOLDS_MAX * limits.jump_k)
     threshold_k = max(jump_k, widened_k)
     repeated = (
         memory.outliers >= limits.OUTLIERS and abs(temperature_c - memory.suspect_c) <= threshold_k
     )
     if step_k <= threshold_k or repeated:
-        return Judged(Verdict.GOOD, temperature_c, steps_k=steps_k)
+        return Judged(Verdict.GOOD, temperature_c, math.nan, 0, steps_k)
     return Judged(Verdict.SPIKE, memory.last_good_c, temperature_c, memory.outliers + 1, steps_k)

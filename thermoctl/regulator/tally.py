@@ -7,7 +7,7 @@ is ever counted down, and none can drift, however long a loop runs.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from operator import add
 from typing import NamedTuple
 
 from thermoctl.signals import ShadowScore
@@ -42,8 +42,7 @@ class Sums(NamedTuple):
 NONE = Sums()
 
 
-@dataclass(frozen=True, slots=True)
-class Tally:
+class Tally(NamedTuple):
     """Rows of sums, the last of them still open.
 
     Parameters
@@ -92,7 +91,7 @@ def _of(played: Round, before: Round | None) -> Sums:
 
 
 def _added(one: Sums, other: Sums) -> Sums:
-    return Sums(*(a + b for a, b in zip(one, other, strict=True)))
+    return Sums(*map(add, one, other))
 
 
 def _score(rows: tuple[Sums, ...]) -> ShadowScore:
