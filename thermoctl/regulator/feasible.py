@@ -67,13 +67,15 @@ class Gathered(NamedTuple):
 class Wanted:
     """What is to be held, in `mode`: a set point in degC, with at most `power_max`.
 
-    `ramp_s` is how long the reference is still on its way there.
+    `ramp_s` is how long the reference is still on its way there; `power_cools` says what power does
+    where it is wired as it should be.
     """
 
     setpoint_c: float
     power_max: float
     mode: Mode
     ramp_s: float = 0.0
+    power_cools: bool = False
 
 
 class Standing:
@@ -268,11 +270,12 @@ def _driven_sds(belief: HeatBelief, wanted: Wanted) -> float:
     for `heater.stuck_on`.
     """
     here_c = float(belief.x[heat_loss.T])
-    beyond_k = math.copysign(1.0, belief.gain) * (here_c - wanted.setpoint_c)
-    if not belief.gain_known or beyond_k < BEYOND_K:
+    sign = -1.0 if wanted.power_cools else 1.0
+    wired_so = belief.gain_known and sign * belief.gain > 0.0
+    if not wired_so or sign * (here_c - wanted.setpoint_c) < BEYOND_K:
         return 0.0
     here = heat_loss.spare(belief, here_c, 0.0)
-    return math.copysign(1.0, belief.gain) * here.mean / here.sd
+    return sign * here.mean / here.sd
 
 
 def _driven_words(belief: HeatBelief, wanted: Wanted) -> str:

@@ -271,7 +271,10 @@ class Regulator:
 
     def _wanted(self) -> Wanted:
         wishes = self._wishes
-        return Wanted(wishes.setpoint_c, self._limits.power_max, wishes.mode, wishes.ramp_s)
+        limits = self._limits
+        return Wanted(
+            wishes.setpoint_c, limits.power_max, wishes.mode, wishes.ramp_s, limits.power_cools
+        )
 
     def _jump_for(self, beliefs: Beliefs) -> float:
         """Return how far the next reading may lie off before it is an outlier."""

@@ -7,7 +7,7 @@ import pytest
 
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
-from thermoctl.signals import Measurement, Mode, SetPoint
+from thermoctl.signals import Measurement, Mode, SetPoint, State
 
 UNREACHABLE = "setpoint.unreachable"
 DRIVEN = "plant.driven"
@@ -149,3 +149,10 @@ def test_water_that_cools_down_to_its_set_point_or_rests_above_it_is_not_driven(
     tank.regulator.request(SetPoint(15.0))
     for _ in range(20):
         assert codes(tank.run(300)) == []
+
+
+def test_a_heater_that_cools_is_reversed_and_the_plant_not_driven():
+    tank = Tank(8.0, -1500.0, 12.0, water_c=39.0, setpoint_c=45.0)
+    step = tank.run(1500)
+    assert step.state is State.LATCHED
+    assert codes(step) == ["heater.reversed"]
