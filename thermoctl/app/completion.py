@@ -1,4 +1,4 @@
-"""What a shell offers after TAB: modes, kinds of laws, and what a running daemon knows.
+"""What a shell offers after TAB: modes, kinds of laws, what a daemon knows.
 
 Nothing here may fail or take long: where no daemon answers, nothing is offered.
 """

@@ -32,7 +32,7 @@ def spelling(console: Console) -> Spelling:
 
 
 def print_lines(console: Console, lines: Iterable[str]) -> None:
-    """Print lines; on a terminal one that is too long goes on below where its text begins."""
+    """Print lines; on a terminal a long one goes on below where its text begins."""
     spell = spelling(console)
     for line in lines:
         shown = _folded(spell(line), console.width) if console.is_terminal else spell(line)
