@@ -221,7 +221,7 @@ def test_the_loss_may_drift_faster_while_the_power_is_far_from_what_holds_the_wa
     h, block = BANK.hypotheses, filters.start(BANK.hypotheses, 25.0)
     heat = np.zeros(len(h))
     calm, restless = (
-        filters.predicted(block, heat, h.sensor_step, BANK.drift, unrest)[D, D] - block[D, D]
+        filters.predicted(block, heat, h, BANK.drift, unrest)[D, D] - block[D, D]
         for unrest in (0.0, 0.8)
     )
     assert restless / calm == pytest.approx(np.full(len(h), (1.0 + filters.UNREST * 0.8) ** 2))

@@ -20,6 +20,7 @@ class Filter:
     shape: tuple[float, float, float]
     h: float
     q: float = 0.0
+    q_mean: float = 0.0
     ln_w: float = 0.0
     x: np.ndarray = field(default_factory=lambda: np.zeros(4))
     P: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
@@ -34,12 +35,15 @@ class Filter:
         self.P[0, 1] = self.P[1, 0] = 0.98
 
     def advance(self, powers):
-        self.q += (1.0 - math.exp(-self.h / self.t1_s)) * (powers[self.nd] - self.q)
+        before, u, decay = self.q, powers[self.nd], math.exp(-self.h / self.t1_s)
+        self.q = u + decay * (before - u)
+        self.q_mean = u + self.t1_s * (1.0 - decay) * (before - u) / self.h  # integral over h
 
     def predict(self, away, t_s):
         a = 1.0 - math.exp(-self.h / self.t2_s)
-        F = np.array([[1, 0, -self.h, self.h * self.q], [a, 1 - a, 0, 0], [0, 0, 1, 0],
-                      [0, 0, 0, 1]])  # fmt: skip
+        c = self.h - self.t2_s * a  # of water that warms by 1 K/s, shown at the end of h
+        F = np.array([[1, 0, -self.h, self.h * self.q_mean], [a, 1 - a, -c, c * self.q_mean],
+                      [0, 0, 1, 0], [0, 0, 0, 1]])  # fmt: skip
         b = max(self.x[3], 1e-4)
         restless = 1 + 5 * away
         noise = [(0.08 * b) ** 2, 0.003**2, (0.0008 * b * restless) ** 2, (2e-4 * b) ** 2]

@@ -179,6 +179,13 @@ class Bank:
             array.setflags(write=False)
         return BankBelief(sample, blind, excitation, way, *met, ahead)
 
+    def foreseen(self, block: filters.Block, belief: BankBelief, applied: float) -> filters.Block:
+        """Return `block`, that of `belief`, as it will be after a period of `applied`."""
+        power = clamp(applied, *self.bounds)
+        way = path.pushed(belief.path, self.hypotheses, power)
+        unrest = _unrest(belief.outlook, power)
+        return filters.predicted(block, way.mean, self.hypotheses, self.drift, unrest)
+
     def lost(self, belief: BankBelief) -> BankBelief:
         """Return the belief after a gap of which the applied power is not known."""
         blind = max(belief.blind, math.ceil(BLIND_S / self.period_s)) + 1
@@ -194,7 +201,7 @@ class Bank:
 
     def _ahead(self, block: filters.Block, way: Path, sample: int, unrest: float) -> filters.Block:
         """Return the block predicted for `sample`."""
-        block = filters.predicted(block, way.heat, self.hypotheses.sensor_step, self.drift, unrest)
+        block = filters.predicted(block, way.mean, self.hypotheses, self.drift, unrest)
         arrived = self._arrivals.get(sample)
         if arrived is not None:
             filters.loosened(block, way.heat, arrived)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 from thermoctl.control.adaptive import trial
 from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.coasting import Outlook, ahead, power_for
-from thermoctl.control.adaptive.filters import GAIN_MIN, T, X, Z
+from thermoctl.control.adaptive.filters import GAIN_MIN, X, Z
 from thermoctl.control.adaptive.plant_belief import (
     gain,
     holding_power_sd,
@@ -223,8 +223,8 @@ class Adaptive:
         periods = (belief.behind_s + situation.interval_s) / self.period_s
         if bank.block is None or belief.since_s > 0.0 or not 0.5 <= periods < 1.5:
             return math.nan
-        x = bank.block[:, X]
-        expected = x[Z] + self.bank.hypotheses.sensor_step * (x[T] - x[Z])
+        applied = self._heat(situation.applied)
+        expected = self.bank.foreseen(bank.block, bank, applied)[Z, X]
         return self._sign * situation.measured_c - float(bank.weights.share.dot(expected))
 
     def beliefs(self, belief: AdaptiveBelief, situation: Situation) -> Beliefs:

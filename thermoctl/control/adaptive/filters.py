@@ -125,16 +125,18 @@ def restarted(block: Block, hypotheses: Hypotheses, y_c: float) -> Block:
 
 
 def predicted(
-    block: Block, heat: Array, sensor_step: Array, drift: Drift, unrest: float = 0.0
+    block: Block, heat: Array, hypotheses: Hypotheses, drift: Drift, unrest: float = 0.0
 ) -> Block:
-    """Return the block one period later: T' = T - d + beta q, z' = z + a (T - z).
+    """Return the block one period later: T' = T - d + beta q, z' = z + a (T - z) + c (T' - T).
 
-    `unrest` is how far the power was from what holds the water.
+    That is exact for water that warms evenly within a period; `heat` is q in the mean of it. Where
+    a period is as long as the lag, a sensor that knew of T alone would show nothing before the next
+    one, and no hypothesis would fit. `unrest` is how far the power was from what holds the water.
     """
     after = block.copy()
-    _move(after, heat, sensor_step)  # F [P | x]
-    _move(after[T], heat, sensor_step)  # F P F', row by row where both row and column move
-    _follow(after[Z], sensor_step)
+    _move(after, heat, hypotheses)  # F [P | x]
+    _move(after[T], heat, hypotheses)  # F P F', row by row where both row and column move
+    _move(after[Z], heat, hypotheses)
     after[D:, :D] = after[:D, D:X].swapaxes(0, 1)  # and by symmetry where one does
     after[Z, T] = after[T, Z]  # the one pair whose two ways of rounding differ
     b = np.maximum(block[BETA, X], drift.gain_min)
@@ -158,20 +160,17 @@ def loosened(block: Block, heat: Array, due: Array) -> None:
     block[D:, D:X] += spread * spread
 
 
-def _move(rows: Block, heat: Array, sensor_step: Array) -> None:
+def _move(rows: Block, heat: Array, hypotheses: Hypotheses) -> None:
     """Multiply four rows by F from the left, in place; columns of P likewise by F'."""
-    _follow(rows, sensor_step)
-    water = rows[T]
-    water -= rows[D]
-    water += rows[BETA] * heat
-
-
-def _follow(rows: Block, sensor_step: Array) -> None:
-    """Let the row of the sensor follow that of the water, in place."""
     water, sensor = rows[T], rows[Z]
     towards = water - sensor
-    towards *= sensor_step
+    towards *= hypotheses.sensor_step
+    warming = rows[BETA] * heat
+    warming -= rows[D]
+    water += warming
     sensor += towards
+    warming *= hypotheses.sensor_soon
+    sensor += warming
 
 
 def inflated(block: Block, nu: float, R: float) -> Block:

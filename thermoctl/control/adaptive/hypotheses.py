@@ -44,6 +44,9 @@ class Hypotheses:
         Time constant of the heater in periods.
     element_step, sensor_step : ndarray
         What heater and sensor make up of a step within a period, in (0, 1].
+    element_late, sensor_soon : ndarray
+        How much of a step the heater owes in the mean of a period, and how much of a ramp that
+        begins with a period the sensor shows at its end, in (0, 1).
     """
 
     period_s: float
@@ -53,6 +56,8 @@ class Hypotheses:
     element: Array
     element_step: Array
     sensor_step: Array
+    element_late: Array
+    sensor_soon: Array
 
     def __post_init__(self) -> None:
         for each in fields(self):
@@ -77,14 +82,18 @@ class Hypotheses:
         lag_s = np.repeat(lags_s, len(SHAPES))
         dead_s, element_s, sensor_s = np.tile(np.array(SHAPES), (LAGS, 1)).T * lag_s
         dead_periods = np.rint(dead_s / period_s)
+        element, sensor = element_s / period_s, sensor_s / period_s
+        element_step, sensor_step = -np.expm1(-1.0 / element), -np.expm1(-1.0 / sensor)
         return cls(
             period_s=float(period_s),
             lag_s=lag_s,
             dead=dead_periods.astype(np.intp),
             dead_periods=dead_periods,
-            element=element_s / period_s,
-            element_step=-np.expm1(-period_s / element_s),
-            sensor_step=-np.expm1(-period_s / sensor_s),
+            element=element,
+            element_step=element_step,
+            sensor_step=sensor_step,
+            element_late=element * element_step,
+            sensor_soon=1.0 - sensor * sensor_step,
         )
 
     def __len__(self) -> int:

@@ -25,18 +25,21 @@ class Path(NamedTuple):
     pending : ndarray, shape (n,)
         Sum of the powers within the dead time, newest included: ``powers[:dead].sum()``.
     heat : ndarray, shape (n,)
-        Power q that reaches the water.
+        Power q that reaches the water at the end of the last period.
+    mean : ndarray, shape (n,)
+        The same in the mean of that period.
     """
 
     powers: Array
     pending: Array
     heat: Array
+    mean: Array
 
 
 def at_rest(hypotheses: Hypotheses) -> Path:
     """Return the path of a plant that never got any power."""
     n = len(hypotheses)
-    return Path(np.zeros(int(hypotheses.dead.max()) + 1), np.zeros(n), np.zeros(n))
+    return Path(np.zeros(int(hypotheses.dead.max()) + 1), *np.zeros((3, n)))
 
 
 def pushed(path: Path, hypotheses: Hypotheses, power: float) -> Path:
@@ -47,7 +50,9 @@ def pushed(path: Path, hypotheses: Hypotheses, power: float) -> Path:
     leaving = powers[hypotheses.dead]  # u[k-1-nd]
     pending = power - leaving
     pending += path.pending
-    heat = leaving - path.heat
-    heat *= hypotheses.element_step
-    heat += path.heat
-    return Path(powers, pending, heat)
+    owed = leaving - path.heat
+    mean = owed * hypotheses.element_late
+    np.subtract(leaving, mean, out=mean)
+    owed *= hypotheses.element_step
+    owed += path.heat
+    return Path(powers, pending, owed, mean)

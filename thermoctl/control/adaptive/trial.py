@@ -21,7 +21,7 @@ import numpy as np
 
 from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.evidence import EVIDENCE_FROM, GATE
-from thermoctl.control.adaptive.filters import T, X, Z
+from thermoctl.control.adaptive.filters import X, Z
 
 DROP_ODDS = -3.0
 """Log odds at which the remembered bank goes: 20 to 1 against it."""
@@ -73,7 +73,8 @@ def met(
         heard = after.excitation.share
     odds = memory.odds
     if heard > 0.0:
-        odds += heard * (foretold(law, bank, y_c) - foretold(law, rival, y_c))
+        told, rivals = (foretold(law, each, y_c, applied) for each in (bank, rival))
+        odds += heard * (told - rivals)
     rival = law.observe(rival, y_c, applied)
     heard_s = memory.heard_s + heard * law.period_s
     return _judged(after, Memory(rival, odds, heard_s))
@@ -100,18 +101,13 @@ def _judged(bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:
     return bank, memory
 
 
-def foretold(law: Bank, belief: BankBelief, y_c: float) -> float:
-    """Return the log likelihood of the reading `y_c`, before the bank has seen it.
-
-    The sensor follows the water it lay in, so what is expected does not depend on the power of the
-    period that has just passed.
-    """
+def foretold(law: Bank, belief: BankBelief, y_c: float, applied: float) -> float:
+    """Return the log likelihood of `y_c` after `applied`, before the bank has seen either."""
     if belief.block is None:
         return 0.0
-    block, a = belief.block, law.hypotheses.sensor_step
-    nu = y_c - (block[Z, X] + a * (block[T, X] - block[Z, X]))
-    S = (1.0 - a) ** 2 * block[Z, Z] + 2.0 * a * (1.0 - a) * block[T, Z] + a * a * block[T, T]
-    S = S + law.drift.z + belief.noise.believed
+    block = law.foreseen(belief.block, belief, applied)
+    nu = y_c - block[Z, X]
+    S = block[Z, Z] + belief.noise.believed
     log = belief.weights.log - 0.5 * (np.log(S) + np.minimum(nu * nu / S, GATE))
     most = float(log.max())
     return most + math.log(float(np.exp(log - most).sum() * belief.weights.share.max()))
