@@ -14,7 +14,6 @@ no more in a block than a heater could do, so that a litre of cold water is soon
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from thermoctl.quantities import clamp
@@ -48,9 +47,12 @@ COMPARED_FROM_S, COMPARED_S = 600.0, 21600.0
 """The loss it had is learnt for the first time, and forgotten over the second."""
 SETTLE_S = 300.0
 """After a jump it is not known what the plant does without power."""
-COOLS_WITHIN_S = 1000.0
+COOLS_WITHIN_S, COOLS_LEAST_S = 1000.0, 30.0
 """Loss grows by a K in so many seconds for every K above where it was learnt: half a litre in a
-draught. What is hotter than ever before may take that much more power before it is a doubt."""
+draught. What is hotter than ever before may take that much more power before it is a doubt. A plant
+that was seen to cool faster may take more, but no more than by the second."""
+SPREAD_K2 = 4.0
+"""How loss grows with the reading is learnt from readings whose variance is more than this."""
 
 
 class Seen(NamedTuple):
@@ -75,8 +77,11 @@ class HeatDoubt:
         self._rise_rate = 0.0
         self._known_s = 0.0
         self._level_c = math.nan
+        self._spread_k2 = self._rise_along = 0.0
+        self._rates_along: Heat = (0.0,) * len(LAGS_S)
+        self._cools_per_s = 1.0 / COOLS_WITHIN_S
         self._stood_c = math.nan
-        self._stood_s = self._stood_loss = 0.0
+        self._stood_s = self._stood_power = 0.0
         self._settle_s = 0.0
         self.since: Seen | None = None
         self.clear()
@@ -88,7 +93,7 @@ class HeatDoubt:
 
     def trust(self, gain: Gain) -> None:
         """Take the loss for what it is now: the heater was asked, and answers."""
-        self._stood_loss = self.loss(gain)
+        self._stood_power = self._holding(gain, self._stood_c)
 
     def loss(self, gain: Gain) -> float:
         """Return how fast the reading should fall without power, in K/s."""
@@ -128,48 +133,69 @@ class HeatDoubt:
             self._extra_k = max(0.0, self._extra_k + extra_k)
         if follow and not jumped and self.calm(gain, block.sd_k):
             most_k = full_k + FOLLOWS_SDS * block.sd_k
-            rise_k = clamp(rise_k, -most_k, most_k)
-            self._follow(gain, heat_s, rise_k, span_s, now.reading_c)
+            self._follow(before, now, clamp(rise_k, -most_k, most_k), gain.lag_s)
+            self._learn_along(gain)
         self._creep(gain, now.reading_c, block)
 
     def _unseen(self, reading_c: float) -> float:
         """Return by how much the loss may have grown since it was learnt, in K/s."""
         above_k = reading_c - self._level_c
-        return above_k / COOLS_WITHIN_S if above_k > 0.0 else 0.0
+        return above_k * self._cools_per_s if above_k > 0.0 else 0.0
 
-    def _follow(
-        self, gain: Gain, heat_s: Sequence[float], rise_k: float, span_s: float, reading_c: float
-    ) -> None:
-        """Let the quiet rates follow those of a block."""
+    def _holding(self, gain: Gain, reading_c: float) -> float:
+        """Return the power that makes up for the loss at `reading_c`."""
+        return (self.loss(gain) + self._unseen(reading_c)) / gain.mean
+
+    def _follow(self, before: Seen, now: Seen, rise_k: float, lag_s: float) -> None:
+        """Let the quiet rates follow those of a block, and how they go with the reading."""
+        span_s = now.t_s - before.t_s
         self._known_s += span_s
-        share = span_s / min(self._known_s, max(MEMORY_S, MEMORY_LAGS * gain.lag_s))
-        pairs = zip(self._rates, heat_s, strict=True)
-        self._rates = tuple([rate + share * (heat / span_s - rate) for rate, heat in pairs])
-        self._rise_rate += share * (rise_k / span_s - self._rise_rate)
+        share = span_s / min(self._known_s, max(MEMORY_S, MEMORY_LAGS * lag_s))
         if math.isnan(self._level_c):
-            self._level_c = reading_c
-        self._level_c += share * (reading_c - self._level_c)
+            self._level_c = now.reading_c
+        above_k, rise_rate = now.reading_c - self._level_c, rise_k / span_s
+        keep, by_k = 1.0 - share, (1.0 - share) * share * above_k
+        rates, along = [], []
+        for place, mean in enumerate(self._rates):
+            off = (now.heat_s[place] - before.heat_s[place]) / span_s - mean
+            rates.append(mean + share * off)
+            along.append(keep * self._rates_along[place] + by_k * off)
+        self._rates, self._rates_along = tuple(rates), tuple(along)
+        off = rise_rate - self._rise_rate
+        self._rise_rate += share * off
+        self._rise_along = keep * self._rise_along + by_k * off
+        self._level_c += share * above_k
+        self._spread_k2 = keep * self._spread_k2 + by_k * above_k
+
+    def _learn_along(self, gain: Gain) -> None:
+        """Learn how loss grows with the reading, where readings were far enough apart."""
+        if self._spread_k2 > SPREAD_K2:
+            along = gain.mean * self._rates_along[gain.place] - self._rise_along
+            cools_per_s = along / self._spread_k2
+            self._cools_per_s = clamp(cools_per_s, 1.0 / COOLS_WITHIN_S, 1.0 / COOLS_LEAST_S)
 
     def _creep(self, gain: Gain, reading_c: float, block: Block) -> None:
         """Notice a loss that grows while the reading stands still."""
-        loss, span_s = self.loss(gain), block.span_s
+        power, span_s = self._holding(gain, reading_c), block.span_s
         if not abs(reading_c - self._stood_c) < max(STANDS_K, SDS * block.sd_k):
-            self._stood_c, self._stood_s, self._stood_loss = reading_c, 0.0, loss
+            self._stood_c, self._stood_s, self._stood_power = reading_c, 0.0, power
         self._stood_s += span_s
         memory_s = COMPARED_S if self._stood_s > COMPARED_FROM_S else MEMORY_S
-        self._stood_loss += min(span_s / memory_s, 1.0) * (loss - self._stood_loss)
-        grown = loss - self._stood_loss
+        self._stood_power += min(span_s / memory_s, 1.0) * (power - self._stood_power)
+        grown = power - self._stood_power
         least_k = max(CREPT_K, SDS * block.sd_k)
-        seen = self._stood_s > COMPARED_FROM_S and grown * MEMORY_S > least_k
-        crept = seen and grown > CREPT * gain.mean
+        seen = self._stood_s > COMPARED_FROM_S and grown * gain.mean * MEMORY_S > least_k
+        crept = seen and grown > CREPT
         self._crept_s = self._crept_s + span_s if crept else 0.0
 
     def told(self, gain: Gain, now: Seen) -> str:
         """Return what was expected since the doubt began, and what came."""
         since, loss = self.since, self.loss(gain)
         if self._crept_s > CREPT_S:
-            grown, before = loss / gain.mean, self._stood_loss / gain.mean
-            return f"expected about {before:.0%} power to hold the reading, it took {grown:.0%}"
+            return (
+                f"expected about {self._stood_power:.0%} power to hold the reading, "
+                f"it took {self._holding(gain, now.reading_c):.0%}"
+            )
         if since is None or not now.t_s > since.t_s:
             return "expected a reading that answers to the power"
         span_s = now.t_s - since.t_s
