@@ -79,13 +79,13 @@ class Wanted:
 
 
 class Standing:
-    """Whether something has been said of the plant long enough; slower to end than to begin."""
+    """Whether something was said of the plant long enough; it ends more slowly."""
 
     def __init__(self) -> None:
         self.stands, self._contrary = False, 0
 
     def weigh(self, sds: float, *, counts: bool) -> bool:
-        """Take in one more stretch, by how many deviations it is so; return whether it is news."""
+        """Take in by how many deviations a stretch says so; return if it is news."""
         stood, far = self.stands, sds > (OVER_SDS if self.stands else SURE_SDS)
         self._contrary = 0 if far is stood else self._contrary + 1
         if self._contrary >= STEADY or not counts:

@@ -261,8 +261,7 @@ class HeaterWatch:
         known, asked_s = self._known, now.t_s - cut.at_s
         lag_s = LAGS_S[-1] if known is None else known.lag_s
         if known is not None and self._off_s > (OFF_LAGS + 1.0) * lag_s:
-            from_s = now.t_s - max(OFF_LAGS * lag_s, BEFORE_S)
-            rate = heat_question.slope(self._rows, from_s, less_sd_k=block.sd_k)
+            rate = self._climb(known, now, block.sd_k)
             if rate > RISES * known.mean:
                 self._fail("heater.stuck_on", _rises(rate), t_s)
                 return
@@ -327,6 +326,11 @@ class HeaterWatch:
         after = heat_question.slope(rows, from_s, less_sd_k=less_sd_k)
         turned = {Answer.HEATS: after < before, Answer.COOLS: after > before}
         return (answer if turned.get(answer, True) else Answer.OPEN), shown
+
+    def _climb(self, known: Gain, now: Seen, sd_k: float) -> float:
+        """Return how fast the reading surely rises, in K/s, when nothing is under way any more."""
+        from_s = now.t_s - max(OFF_LAGS * known.lag_s, BEFORE_S)
+        return heat_question.slope(self._rows, from_s, less_sd_k=sd_k)
 
     def _wild(self, known: Gain, from_s: float, gains: float) -> bool:
         """Return whether the reading fell faster than loss and so many `gains` together."""
