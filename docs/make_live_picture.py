@@ -12,7 +12,7 @@ from datetime import datetime
 from pathlib import Path
 
 from thermoctl.app.compose import loop_for
-from thermoctl.app.insight_watch import insights_for
+from thermoctl.app.daemon.insight_watch import insights_for
 from thermoctl.app.live import Facts, LiveModel, Look, render
 from thermoctl.app.live.picture import svg
 from thermoctl.app.sim import bench_settings

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from thermoctl.app.compare_command import contender
+from thermoctl.app.commands.compare import contender
 from thermoctl.app.settings import load
 from thermoctl.app.sim import profile
 from thermoctl.studies.compare.bounds import bounds

@@ -17,7 +17,7 @@ PATIENCE_S = 15.0
 WATCHED = """
 import atexit, sys
 from pathlib import Path
-from thermoctl.app import daemon
+from thermoctl.app.daemon import daemon
 from thermoctl_drivers.simulated import SimulatedBoard as Board
 
 powers = []

@@ -24,7 +24,7 @@ import click
 from thermoctl import __version__
 from thermoctl.app.compose import loop_for
 from thermoctl.app.cycle_record import as_line
-from thermoctl.app.insight_watch import InsightService, insights_for
+from thermoctl.app.daemon.insight_watch import InsightService, insights_for
 from thermoctl.app.live import Action, Desk, Facts, Keys, LiveModel, LiveScreen, look_for
 from thermoctl.app.live.desk import DISTURBANCES
 from thermoctl.app.live.look import printable
@@ -40,7 +40,7 @@ from thermoctl.services.places import make_private, state_dir
 from thermoctl.signals import Cycle, Event
 
 if TYPE_CHECKING:
-    from thermoctl.app.order_watch import OrderService
+    from thermoctl.app.daemon.order_watch import OrderService
 
 HISTORY = "sim.sqlite"
 _DRAW_S = 0.05
@@ -114,7 +114,7 @@ def _orders_beside(settings: Settings, loop: Loop) -> OrderService | None:
     """Return what weighs orders beside the loops, where one asks for it; without a thread."""
     if not any(table.weighs_orders for table in settings.loops.values()):
         return None
-    from thermoctl.app.order_watch import OrderService, watches_for
+    from thermoctl.app.daemon.order_watch import OrderService, watches_for
 
     return OrderService(watches_for(settings.loops), _reports(loop))
 

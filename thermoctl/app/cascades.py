@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from thermoctl.app.configuration.tables import CascadeTable, LoopTable
 from thermoctl.app.plugins import nearest
-from thermoctl.app.tables import CascadeTable, LoopTable
 
 
 def cascade_errors(loops: Mapping[str, LoopTable]) -> Iterator[tuple[tuple[str, ...], str]]:

@@ -17,32 +17,32 @@ import click
 from click.core import ParameterSource
 
 from thermoctl import __version__
-from thermoctl.app.endings import EXPECTED, flush, prepare_streams, tell
-from thermoctl.app.options import DURATION, FILE, SPEED, Commands, examples, state_option
+from thermoctl.app.commands.endings import EXPECTED, flush, prepare_streams, tell
+from thermoctl.app.commands.options import DURATION, FILE, SPEED, Commands, examples, state_option
 
 _COMMANDS: Final = {
-    "run": "thermoctl.app.service_commands:run",
-    "off": "thermoctl.app.off_command:off",
-    "status": "thermoctl.app.control_commands:status",
-    "get": "thermoctl.app.control_commands:get",
-    "set": "thermoctl.app.control_commands:set_command",
-    "mode": "thermoctl.app.control_commands:mode",
-    "output": "thermoctl.app.control_commands:output",
-    "load": "thermoctl.app.control_commands:load",
-    "controller": "thermoctl.app.control_commands:controller",
-    "shadow": "thermoctl.app.control_commands:shadow",
-    "watch": "thermoctl.app.control_commands:watch",
-    "alarms": "thermoctl.app.alarm_commands:alarms",
-    "history": "thermoctl.app.service_commands:history",
-    "config": "thermoctl.app.config_commands:config",
-    "drivers": "thermoctl.app.board_commands:drivers",
-    "doctor": "thermoctl.app.board_commands:doctor",
-    "simulate": "thermoctl.app.board_commands:simulate",
-    "tune": "thermoctl.app.tune_command:tune_command",
-    "forget": "thermoctl.app.forget_command:forget",
-    "replay": "thermoctl.app.study_commands:replay_command",
-    "reproduce": "thermoctl.app.reproduce_commands:reproduce",
-    "compare": "thermoctl.app.compare_command:compare",
+    "run": "thermoctl.app.commands.service:run",
+    "off": "thermoctl.app.commands.off:off",
+    "status": "thermoctl.app.commands.control:status",
+    "get": "thermoctl.app.commands.control:get",
+    "set": "thermoctl.app.commands.control:set_command",
+    "mode": "thermoctl.app.commands.control:mode",
+    "output": "thermoctl.app.commands.control:output",
+    "load": "thermoctl.app.commands.control:load",
+    "controller": "thermoctl.app.commands.control:controller",
+    "shadow": "thermoctl.app.commands.control:shadow",
+    "watch": "thermoctl.app.commands.control:watch",
+    "alarms": "thermoctl.app.commands.alarms:alarms",
+    "history": "thermoctl.app.commands.service:history",
+    "config": "thermoctl.app.commands.config:config",
+    "drivers": "thermoctl.app.commands.boards:drivers",
+    "doctor": "thermoctl.app.commands.boards:doctor",
+    "simulate": "thermoctl.app.commands.boards:simulate",
+    "tune": "thermoctl.app.commands.tune:tune_command",
+    "forget": "thermoctl.app.commands.forget:forget",
+    "replay": "thermoctl.app.commands.replay:replay_command",
+    "reproduce": "thermoctl.app.commands.reproduce:reproduce",
+    "compare": "thermoctl.app.commands.compare:compare",
 }
 
 

@@ -17,10 +17,10 @@ from pydantic import BaseModel
 
 from thermoctl.app import plugins
 from thermoctl.app.cascades import cascade_errors
+from thermoctl.app.configuration.tables import CascadeTable, LoopTable, SensorTable
 from thermoctl.app.parts import law_for, plan_for, sensor_for
 from thermoctl.app.plugins import BadOption
 from thermoctl.app.settings import Settings
-from thermoctl.app.tables import CascadeTable, LoopTable, SensorTable
 from thermoctl.errors import ConfigError, LinkError
 from thermoctl.model.actuator import Linear
 from thermoctl.ports import Board, Clock, Remembered

@@ -13,8 +13,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from thermoctl.app import plugins
-from thermoctl.app.plugins import BadOption
-from thermoctl.app.tables import (
+from thermoctl.app.configuration.tables import (
     ActuatorTable,
     EstimatorTable,
     LoopTable,
@@ -22,6 +21,7 @@ from thermoctl.app.tables import (
     Options,
     SensorTable,
 )
+from thermoctl.app.plugins import BadOption
 from thermoctl.estimation import Guarded, Identifier, RandomWalkKalman
 from thermoctl.estimation.kalman import CorrectedKalman
 from thermoctl.model import actuator as laws

@@ -11,7 +11,7 @@ from typing import Final
 
 from serial.tools import list_ports
 
-from thermoctl.app.service_commands import SERVICE_STATE
+from thermoctl.app.commands.service import SERVICE_STATE
 from thermoctl.services.lock import LONGEST, device_lock_path
 from thermoctl.services.places import runtime_dir
 

@@ -15,10 +15,22 @@ from pydantic import BaseModel, Field, SerializeAsAny, ValidationError
 
 from thermoctl.app import plugins
 from thermoctl.app.cascades import cascade_errors
-from thermoctl.app.document import BadConfiguration, Document, KeyPath, Problem, read_document
+from thermoctl.app.configuration.document import (
+    BadConfiguration,
+    Document,
+    KeyPath,
+    Problem,
+    read_document,
+)
+from thermoctl.app.configuration.tables import HistoryTable, LoopTable, ServiceTable, Table
+from thermoctl.app.configuration.wording import (
+    reasons,
+    shown,
+    unknown_key,
+    validated,
+    without_unknown_keys,
+)
 from thermoctl.app.parts import check_parts
-from thermoctl.app.tables import HistoryTable, LoopTable, ServiceTable, Table
-from thermoctl.app.wording import reasons, shown, unknown_key, validated, without_unknown_keys
 from thermoctl.errors import ConfigError
 
 ETC = Path("/etc/thermoctl")

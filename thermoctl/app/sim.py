@@ -9,9 +9,9 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from thermoctl.app.compose import loop_for, started_as
+from thermoctl.app.configuration.tables import ActuatorTable, LoopTable, SensorTable
 from thermoctl.app.parts import COOL, action_of, plan_for
 from thermoctl.app.settings import Settings, load
-from thermoctl.app.tables import ActuatorTable, LoopTable, SensorTable
 from thermoctl.errors import ConfigError
 from thermoctl.quantities import clamp
 from thermoctl.runtime.clock import SimulatedClock

@@ -1,7 +1,7 @@
 """One loop, watched: finished steps go in, an `Insight` comes out.
 
-Fed beside the loop, never by its thread: see ``thermoctl/app/insight_watch.py``. A step costs a
-tenth of a millisecond; a judgement, once a minute of the loop's time, some ten.
+Fed beside the loop, never by its thread: see ``thermoctl/app/daemon/insight_watch.py``. A step
+costs a tenth of a millisecond; a judgement, once a minute of the loop's time, some ten.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from thermoctl.app.advice import ADVICE, advice_for
-from thermoctl.app.alarm_commands import _described
+from thermoctl.app.commands.alarms import _described
 from thermoctl.services.events import EVENTS
 
 ROW = {"loop": "tank", "code": "sensor.open", "since": "noon", "text": "an open circuit"}

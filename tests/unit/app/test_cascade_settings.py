@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 from thermoctl.app.compose import loop_for, wiring_errors
-from thermoctl.app.document import BadConfiguration
+from thermoctl.app.configuration.document import BadConfiguration
+from thermoctl.app.configuration.tables import CascadeTable
 from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
 from thermoctl.app.sim import bench_settings
-from thermoctl.app.tables import CascadeTable
-from thermoctl.app.trial import alone
+from thermoctl.app.tuning.trial import alone
 from thermoctl.errors import ConfigError
 from thermoctl.runtime.clock import SimulatedClock
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from thermoctl.app.configuration.tables import SensorTable
 from thermoctl.app.parts import reach_c, sensor_for
 from thermoctl.app.settings import load
-from thermoctl.app.tables import SensorTable
 from thermoctl.errors import ConfigError
 from thermoctl.signals import Quality, RawSample
 

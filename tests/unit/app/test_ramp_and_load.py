@@ -5,8 +5,8 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from thermoctl.app.clerk import Clerk
-from thermoctl.app.control_commands import _POWER, _RATE, load, mode
+from thermoctl.app.commands.control import _POWER, _RATE, load, mode
+from thermoctl.app.daemon.clerk import Clerk
 from thermoctl.services.control_protocol import Call, CallError, asking, parse
 from thermoctl.signals import Load, SetPoint
 

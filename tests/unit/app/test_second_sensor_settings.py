@@ -6,7 +6,7 @@ from thermoctl.app.compose import loop_for
 from thermoctl.app.doctor import boards
 from thermoctl.app.settings import load
 from thermoctl.app.sim import bench_settings
-from thermoctl.app.trial import alone
+from thermoctl.app.tuning.trial import alone
 from thermoctl.errors import ConfigError
 from thermoctl.runtime.clock import SimulatedClock
 from thermoctl.testing import ManualClock

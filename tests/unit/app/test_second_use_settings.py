@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from thermoctl.app.compose import regulator_for, wiring_errors
-from thermoctl.app.document import BadConfiguration
+from thermoctl.app.configuration.document import BadConfiguration
 from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
 from thermoctl.app.sim import bench_settings, simulate

@@ -14,9 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thermoctl.app.compose import regulator_for, wiring_errors
-from thermoctl.app.document import BadConfiguration, exposures
-from thermoctl.app.settings import load, load_all
-from thermoctl.app.tables import (
+from thermoctl.app.configuration.document import BadConfiguration, exposures
+from thermoctl.app.configuration.tables import (
     ActuatorTable,
     GuardsTable,
     HistoryTable,
@@ -25,6 +24,7 @@ from thermoctl.app.tables import (
     SensorTable,
     ServiceTable,
 )
+from thermoctl.app.settings import load, load_all
 from thermoctl.errors import ConfigError
 from thermoctl_drivers.simulated import SimulatedSettings
 

@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 import pytest
 
-from thermoctl.app.control_commands import _described
+from thermoctl.app.commands.control import _described
 from thermoctl.app.cycle_record import cycle_record
 from thermoctl.app.sim import bench_settings, simulate
 from thermoctl.signals import ShadowScore

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from thermoctl.app.clerk import Clerk
-from thermoctl.app.insight_watch import InsightService, insights_for
-from thermoctl.app.insight_words import insight_lines
+from thermoctl.app.daemon.clerk import Clerk
+from thermoctl.app.daemon.insight_watch import InsightService, insights_for
+from thermoctl.app.daemon.insight_words import insight_lines
 from thermoctl.app.sim import bench_settings, simulate
 from thermoctl.insight import Change, Drift, Gate, Insight, Insights, Performance, Row
 from thermoctl.services.control_protocol import Call

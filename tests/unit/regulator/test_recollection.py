@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
+from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.parts import plan_for
-from thermoctl.app.tables import LoopTable
 from thermoctl.control.adaptive import Adaptive
 from thermoctl.control.pid import Pid
 from thermoctl.ports import Remembered

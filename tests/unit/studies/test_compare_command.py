@@ -6,7 +6,7 @@ import re
 import pytest
 from click.testing import CliRunner
 
-from thermoctl.app.compare_command import RESULTS, compare, contender
+from thermoctl.app.commands.compare import RESULTS, compare, contender
 from thermoctl.app.plugins import BadOption
 from thermoctl.app.settings import load
 from thermoctl.app.sim import profile

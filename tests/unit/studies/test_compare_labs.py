@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermoctl.app.compare_command import contender
+from thermoctl.app.commands.compare import contender
 from thermoctl.app.settings import load
 from thermoctl.app.sim import profile
 from thermoctl.control.manual import Manual

@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from thermoctl.app.compare_command import contender
+from thermoctl.app.commands.compare import contender
 from thermoctl.app.plugins import BadOption
 from thermoctl.app.settings import load
 from thermoctl.app.sim import profile

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from thermoctl.app.reproduce_commands import reproduce
+from thermoctl.app.commands.reproduce import reproduce
 from thermoctl.control.minimum_variance import SelfTuningMinimumVariance
 from thermoctl.estimation import Identifier
 from thermoctl.model.arx import KnownGain

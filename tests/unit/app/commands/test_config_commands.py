@@ -1,0 +1,354 @@
+"""``thermoctl config`` and ``thermoctl drivers`` from the command line."""
+
+from __future__ import annotations
+
+import json
+import resource
+import tomllib
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thermoctl.app.cli import cli, main
+from thermoctl.app.compose import wiring_errors
+from thermoctl.app.configuration.toml_text import toml_text
+from thermoctl.app.settings import load
+
+PROFILES = sorted((Path(__file__).parents[4] / "config").glob("*.toml"))
+VALUES = st.recursive(
+    st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3),
+    max_leaves=5,
+)
+TREES = st.dictionaries(
+    st.text(max_size=6), VALUES | st.dictionaries(st.text(max_size=6), VALUES), max_size=4
+)
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]):
+    """Return a function that runs a command and returns exit code, stdout and stderr."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as ended:
+            main([str(each) for each in arguments])
+        out, err = capsys.readouterr()
+        code = ended.value.code
+        assert isinstance(code, int)
+        return code, out, err
+
+    return run
+
+
+@pytest.fixture
+def file(tmp_path: Path, whole: str) -> Path:
+    """Return a configuration file that can run, writable by its owner only."""
+    path = tmp_path / "tank.toml"
+    path.write_text(whole)
+    path.chmod(0o644)
+    return path
+
+
+# -- check -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", PROFILES, ids=lambda path: path.stem)
+def test_every_profile_passes_the_check(run, path):
+    code, out, _ = run("config", "check", "-c", path)
+    assert code == 0
+    held = [
+        f"{name} ({loop.setpoint_c:g} °C, off above {loop.trip_above_c:g} °C"
+        for name, loop in load(path).loops.items()
+    ]
+    assert out.startswith(f"{path}: ok; loops: {held[0]}")
+    assert all(each in out for each in held)
+    assert out.count("\n") == 1
+
+
+def test_a_good_configuration_is_told_in_one_line_and_nothing_else(run, file):
+    assert run("config", "check", "-c", file) == (
+        0,
+        f"{file}: ok; loops: tank (37.5 °C, off above 60 °C, self-tuning-mv, every 1 s); "
+        "boards: daq (simulated)\n",
+        "",
+    )
+
+
+def test_a_bad_configuration_exits_78_with_every_error_on_stderr(run, file):
+    text = file.read_text().replace("setpoint_c", "setpoint").replace('"square"', '"cube"')
+    file.write_text(text)
+    code, out, err = run("config", "check", "-c", file)
+    assert (code, out) == (78, "")
+    assert f"thermoctl: {file}:6: loops.tank.setpoint: unknown key; did you mean 'se" in err
+    assert f"thermoctl: {file}:14: loops.tank.actuator.law: expected 'linear', 'squ" in err
+
+
+def test_a_loop_that_cannot_run_fails_the_check_on_its_line(run, file):
+    text = file.read_text().replace('[loops.tank.sensor]\nboard = "daq"\n', "")
+    file.write_text(text)
+    code, _, err = run("config", "check", "-c", file)
+    assert code == 78
+    assert err == f"thermoctl: {file}:5: loops.tank: needs a table [loops.tank.sensor] to run\n"
+
+
+def test_a_board_without_a_dead_man_fails_the_check_on_its_line(run, file, foreign):
+    file.write_text(file.read_text().replace('"simulated"\nvolume_l = 8.0', '"foreign"'))
+    code, _, err = run("config", "check", "-c", file)
+    assert code == 78
+    assert err.startswith(f"thermoctl: {file}:1: boards.daq: Foreign cannot switch")
+
+
+def test_the_errors_travel_as_json(run, file):
+    file.write_text(file.read_text() + "\n[histroy]\n")
+    code, out, _ = run("config", "check", "-c", file, "--json")
+    error = json.loads(out)["error"]
+    assert code == error["exit_code"] == 78
+    assert error["problems"] == [
+        {
+            "file": str(file),
+            "line": 24,
+            "key": "histroy",
+            "text": "unknown key; did you mean 'history'?",
+        }
+    ]
+
+
+def test_a_good_check_travels_as_json(run, file):
+    code, out, _ = run("config", "check", "-c", file, "--json")
+    assert code == 0
+    assert json.loads(out) == {
+        "ok": True,
+        "loops": ["tank"],
+        "boards": {"daq": "simulated"},
+        "warnings": [],
+    }
+
+
+def test_a_file_that_its_group_may_write_to_passes_with_a_warning(run, file):
+    file.chmod(0o664)
+    code, _, err = run("config", "check", "-c", file)
+    assert code == 0
+    assert err.startswith(f"thermoctl: {file}: group ")
+
+
+# -- show and schema -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", PROFILES, ids=lambda path: path.stem)
+def test_what_is_shown_loads_as_the_same_settings(run, path):
+    code, out, err = run("config", "show", "-c", path)
+    assert (code, err) == (0, "")
+    assert load(tomllib.loads(out)) == load(path)
+
+
+def test_what_is_shown_as_json_loads_as_the_same_settings(run, file):
+    _, out, _ = run("config", "show", "-c", file, "--json")
+    assert load(json.loads(out)) == load(file)
+
+
+def test_what_is_shown_holds_defaults(run, file):
+    _, out, _ = run("config", "show", "-c", file)
+    shown = tomllib.loads(out)
+    assert "period_s" not in file.read_text()
+    assert shown["loops"]["tank"]["period_s"] == 1.0
+
+
+@given(TREES)
+def test_whatever_is_written_as_toml_is_read_back(tree):
+    assert tomllib.loads(toml_text(tree)) == tree
+
+
+def test_what_toml_does_not_know_is_not_written():
+    with pytest.raises(TypeError, match="expected text, a number, true, false or a list, got None"):
+        toml_text({"a": None})
+
+
+def test_the_schema_describes_boards_and_laws_by_kind(run):
+    code, out, _ = run("config", "schema")
+    schema = json.loads(out)
+    assert code == 0
+    boards = schema["properties"]["boards"]["additionalProperties"]["oneOf"]
+    kinds = [board["properties"]["kind"]["const"] for board in boards]
+    assert kinds == ["null", "simulated", "thermodaq"]
+    loop = schema["$defs"]["LoopTable"]["properties"]
+    assert loop["setpoint_c"]["x-unit"] == "°C"
+    assert loop["setpoint_c"]["description"] == "Temperature to hold."
+    [ckf] = [e for e in loop["estimator"]["anyOf"] if e["properties"]["kind"]["const"] == "ckf"]
+    assert {"R1", "R2", "inflation_max", "P0", "theta0", "guards"} <= set(ckf["properties"])
+    assert "Variance of the noise" in ckf["properties"]["R2"]["description"]
+    [vff] = [e for e in loop["estimator"]["anyOf"] if e["properties"]["kind"]["const"] == "vff"]
+    assert vff["required"] == ["kind", "Sigma0"]
+
+
+def test_every_reference_in_the_schema_leads_somewhere(run):
+    _, out, _ = run("config", "schema")
+    schema = json.loads(out)
+
+    def references(node: object) -> list[str]:
+        if isinstance(node, dict):
+            own = [node["$ref"]] if "$ref" in node else []
+            return own + [each for value in node.values() for each in references(value)]
+        return [e for each in node for e in references(each)] if isinstance(node, list) else []
+
+    found = references(schema)
+    assert found
+    assert {each.removeprefix("#/$defs/") for each in found} <= set(schema["$defs"])
+
+
+# -- new -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["simulated", "null", "thermodaq"])
+def test_a_new_configuration_of_any_kind_can_run(run, tmp_path, kind):
+    path = tmp_path / "new.toml"
+    code, out, err = run("config", "new", "--yes", "--kind", kind, "-o", path)
+    assert (code, out) == (0, "")
+    assert str(path) in err
+    assert list(wiring_errors(load(path))) == []
+
+
+def test_a_new_configuration_has_the_gain_of_the_heater_and_the_water(run):
+    _, out, _ = run("config", "new", "--yes", "--heater-w", 2000, "--volume-l", 20)
+    loop = load(tomllib.loads(out)).loops["tank"]
+    assert loop.model.gain_k_per_s == pytest.approx(2000 / (4186 * 20), rel=5e-3)
+
+
+def test_the_answers_of_a_person_become_the_configuration():
+    answers = "thermodaq\n/dev/ttyACM3\nntc\n4700\n12\n1000\n65\n80\noff\n"
+    result = CliRunner().invoke(cli, ["config", "new"], input=answers)
+    assert result.exit_code == 0, result.stderr
+    settings = load(tomllib.loads(result.stdout))
+    loop = settings.loops["tank"]
+    assert settings.boards["daq"].port == "/dev/ttyACM3"
+    assert (loop.sensor.curve, loop.sensor.pull_up_ohm) == ("ntc", 4700.0)
+    assert (loop.setpoint_c, loop.trip_above_c, loop.mode) == (65.0, 80.0, "off")
+    assert loop.setpoint_c < loop.setpoint_max_c < loop.trip_above_c
+
+
+def test_a_trip_below_the_setpoint_is_asked_again():
+    answers = "simulated\nlm335\n8\n1500\n60\n50\n70\nauto\n"
+    result = CliRunner().invoke(cli, ["config", "new"], input=answers)
+    assert result.exit_code == 0, result.stderr
+    assert load(tomllib.loads(result.stdout)).loops["tank"].trip_above_c == 70.0
+
+
+def test_water_is_neither_held_nor_tripped_above_100_degrees():
+    answers = "simulated\nlm335\n8\n1500\n120\n60\n1500\n100\nauto\n"
+    result = CliRunner().invoke(cli, ["config", "new"], input=answers)
+    assert result.exit_code == 0, result.stderr
+    loop = load(tomllib.loads(result.stdout)).loops["tank"]
+    assert (loop.setpoint_c, loop.trip_above_c) == (60.0, 100.0)
+
+
+@pytest.mark.parametrize("setpoint_c", [-5.0, 37.5, 96.0, 99.5, 150.0])
+@pytest.mark.parametrize("sensor", ["lm335", "lm35", "tmp36", "pt100", "pt1000", "ntc", "linear"])
+def test_the_usual_answers_suit_every_sensor_that_can_show_the_setpoint(run, sensor, setpoint_c):
+    code, out, err = run("config", "new", "--yes", "--sensor", sensor, f"--setpoint-c={setpoint_c}")
+    cannot = (sensor in ("lm35", "linear") and setpoint_c < 10.0) or (sensor, setpoint_c) == (
+        "ntc",
+        150.0,
+    )
+    assert (code, out != "") == ((78, False) if cannot else (0, True)), err
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "much"])
+@pytest.mark.parametrize("option", ["--volume-l", "--heater-w"])
+def test_a_size_that_is_none_is_refused(run, option, value):
+    code, out, _ = run("config", "new", "--yes", option, value)
+    assert code in (2, 78)
+    assert out == ""
+
+
+def test_options_that_contradict_each_other_write_nothing(run, tmp_path):
+    path = tmp_path / "new.toml"
+    arguments = ("--yes", "--setpoint-c", 60, "--trip-above-c", 50, "-o", path)
+    code, _, err = run("config", "new", *arguments)
+    assert code == 78
+    assert "expected --trip-above-c above the set point of 60 degC, got 50" in err
+    assert not path.exists()
+
+
+@pytest.fixture
+def short_files():
+    """Let no file grow beyond a hundred bytes, as on a disk that is full."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.usefixtures("short_files")
+def test_a_file_that_cannot_be_written_whole_is_named_and_not_left_behind(run, tmp_path):
+    path = tmp_path / "new.toml"
+    code, _, err = run("config", "new", "--yes", "-o", path)
+    assert (code, err) == (1, f"thermoctl: {path}: File too large\n")
+    assert not path.exists()
+
+
+def test_the_watts_that_were_answered_are_the_loop_s_too(run, tmp_path):
+    path = tmp_path / "new.toml"
+    assert run("config", "new", "--yes", "--heater-w", 800, "-o", path)[0] == 0
+    assert load(path).loops["tank"].heater_w == 800.0
+
+
+def test_a_board_without_a_dead_man_needs_the_promise_of_a_thermostat(run, foreign):
+    code, _, err = run("config", "new", "--yes", "--kind", "foreign")
+    assert code == 78
+    assert "accept_no_dead_man" in err
+    code, out, _ = run("config", "new", "--yes", "--kind", "foreign", "--accept-no-dead-man")
+    assert code == 0
+    assert tomllib.loads(out)["service"] == {"accept_no_dead_man": True}
+
+
+def test_a_file_that_is_there_is_replaced_only_by_force(run, file):
+    before = file.read_text()
+    code, _, err = run("config", "new", "--yes", "-o", file)
+    assert code == 1
+    assert "--force replaces it" in err
+    assert file.read_text() == before
+    assert run("config", "new", "--yes", "--force", "-o", file)[0] == 0
+    assert file.read_text() != before
+
+
+# -- drivers ---------------------------------------------------------------------------------------
+
+
+def test_drivers_are_listed_with_dead_man_and_origin(run, foreign):
+    code, out, _ = run("drivers", "--json")
+    told = {each["kind"]: each for each in json.loads(out)}
+    assert code == 0
+    assert told["thermodaq"]["dead_man"] is True
+    assert told["foreign"] == {
+        "kind": "foreign",
+        "dead_man": False,
+        "origin": "thermoctl-foreign 1.2",
+        "text": "A board from elsewhere.",
+    }
+
+
+def test_a_driver_that_cannot_be_loaded_does_not_hide_the_others(run, foreign):
+    code, out, _ = run("drivers")
+    lines = {line.split()[0]: line for line in out.splitlines()[1:]}
+    assert code == 0
+    assert "cannot be loaded" in lines["broken"]
+    assert lines["simulated"].split()[1] == "yes"
+
+
+def test_the_settings_of_a_kind_are_shown_with_bounds_and_defaults(run):
+    code, out, _ = run("drivers", "show", "thermodaq")
+    rows = {line.split()[0]: line for line in out.splitlines()[2:]}
+    assert code == 0
+    assert "required" in rows["port"]
+    assert "number, s" in rows["dead_man_s"]
+    assert "≥ 0.2, ≤ 10" in rows["dead_man_s"]
+    assert " 2.5 " in rows["dead_man_s"]
+    assert rows["dead_man_s"].find("The board cuts") == rows["port"].find("Serial device") > 0
+
+
+def test_the_settings_of_an_unknown_kind_are_a_wrong_use(run):
+    code, _, err = run("drivers", "show", "thermodac")
+    assert code == 2
+    assert "no driver is called 'thermodac'; did you mean 'thermodaq'?" in err

@@ -1,0 +1,1 @@
+"""Configuration files: what they may hold, how they are read, begun and refused."""

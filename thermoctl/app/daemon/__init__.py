@@ -1,0 +1,1 @@
+"""The daemon, who answers for it, and who thinks beside it."""

@@ -1,0 +1,1 @@
+"""Commissioning: the run, the trial of a signal, and what is reported."""
