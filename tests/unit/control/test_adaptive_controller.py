@@ -78,7 +78,9 @@ def test_calmness_divides_the_power_an_error_is_met_with():
     belief, _ = steered(Adaptive(), Vessel(), 1000)
     outlook, path = belief.bank.outlook, belief.bank.path
     held = np.full_like(path.powers, outlook.holding_power)
-    belief = replace(belief, bank=replace(belief.bank, path=path._replace(powers=held)))
+    still = outlook._replace(surplus=0.0, spread_k=0.0)
+    bank = replace(belief.bank, path=path._replace(powers=held), outlook=still)
+    belief = replace(belief, bank=bank)
     aims = []
     for calmness in (0.3, 0.6, 1.2):
         now = situation(37.5, 0.2, outlook.coasting_c + 0.02)

@@ -75,7 +75,8 @@ class Filter:
         T, _, d, beta = self.x
         u_ss = min(max(d / beta, u_min), u_max)
         under_way = sum(powers[i] - u_ss for i in range(self.nd))
-        return u_ss, T + beta * (self.t1_s * (self.q - u_ss) + self.h * under_way), self.lag_s, beta
+        coasting = T + beta * (self.t1_s * (self.q - u_ss) + self.h * under_way)
+        return u_ss, coasting, self.lag_s, beta, beta * self.t1_s, self.q - u_ss
 
 
 class PlainBank:
@@ -83,7 +84,7 @@ class PlainBank:
 
     def __init__(self, h=1.0, u_min=0.0, u_max=1.0, kappa=0.6):
         self.h, self.u_min, self.u_max, self.kappa = h, u_min, u_max, kappa
-        lags = [3.0 * 50.0 ** (i / 15.0) for i in range(16)]
+        lags = [3.0 * 50.0 ** (i / 23.0) for i in range(24)]
         self.filters = [Filter(lag_s, shape, h) for lag_s in lags for shape in SHAPES]
         self.powers = [0.0] * 4000
         self.R_hat, self.u_mean, self.n, self.k = 0.001, 0.0, 0, -1
@@ -151,13 +152,23 @@ class PlainBank:
     def decide(self, r):
         w = np.exp([each.ln_w for each in self.filters])
         rows = [each.coasting(self.powers, self.u_min, self.u_max) for each in self.filters]
-        u_ss, coasting, lag, beta = w @ np.array(rows) / w.sum()
-        self.told = (u_ss, coasting, lag, beta)
-        heavy = min(max(beta * lag / 1.2, 1.0), 2.0)
+        rows = np.array(rows)
+        u_ss, coasting, lag, beta, heater, surplus = self.told = w @ rows / w.sum()
+        spread = math.sqrt(w @ (rows[:, 1] - coasting) ** 2 / w.sum())
+        heavy = min(max(beta * lag / 1.2, 1.0), 3.0)
         Tc = max(3.0, FASTEST_PERIODS * self.h, self.kappa * heavy * lag)
         tau, before = 0.4 * Tc, self.powers[0]
         aim = coasting + beta * tau * (before - u_ss)
-        wanted = u_ss + (r - aim) / (beta * Tc)
+        moving = 1.0 + 0.4 * (heavy - 2.0)  # share of the heater's heat that counts
+        aim -= heater * surplus
+        size = abs(surplus)
+        aim += heater * max(moving * size, 2.2 * min(size, 0.08)) * (1 if surplus > 0 else -1)
+        error, doubt = r - aim, max(spread - 0.05, 0.0)
+        if error > 0:
+            error = max(error - doubt, 0.0)
+        elif self.u_min < 0:
+            error = min(error + doubt, 0.0)
+        wanted = u_ss + error / (beta * Tc)
         u = before + (wanted - before) * self.h / (self.h + tau)
         return min(max(u, self.u_min), self.u_max)
 
@@ -209,7 +220,7 @@ def test_every_step_is_that_of_filters_run_one_by_one(h, u_min, samples):
         jumps += belief.gate.jumped
         saturated += u in bank.bounds
         told = (belief.outlook.holding_power, belief.outlook.coasting_c, belief.outlook.lag_s,
-                belief.outlook.gain)  # fmt: skip
+                belief.outlook.gain, belief.outlook.heater_k, belief.outlook.surplus)  # fmt: skip
         largest = max(largest, abs(u - expected), *np.abs(np.subtract(told, plain.told)))
         per_period = np.array([1.0, 1.0, h, h])
         P = np.array([each.P * np.outer(per_period, per_period) for each in plain.filters])

@@ -27,6 +27,7 @@ Implements section 9 of ``docs/theory.md``.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -41,12 +42,24 @@ FASTEST_S = 3.0
 FASTEST_PERIODS = 1.5
 """Nor shorter than so many samples: at one sample any error of the gain would be given back whole,
 and below it the loop would be unstable."""
-HEAVY_K, CALMER = 1.2, 2.0
+HEAVY_K, CALMER = 1.2, 3.0
 """Where full power puts more than so many kelvin on their way within a lag, each tenth by which the
 lag is mistaken is that much overshoot: Tc grows by as much, and no more than so many times."""
 SMOOTHNESS = 0.4
 """The lag of the power itself, as a share of Tc. Noise costs a good deal less travel than at once,
 while a power that has far to go is at its limit at once all the same."""
+
+CARRIED, EVEN = 0.4, 2.0
+"""On the move so much of the heat in the heater is left out of account. Were all of it counted, the
+error would go by Tc and the water follow as slowly as the heater; so both go at one pace, damped by
+some .85. A lag that is mistaken then costs more: where Tc is so many times as long all of that heat
+counts, and beyond it even more."""
+AT_REST, REST = 2.2, 0.08
+"""Within so small a surplus of power that heat counts so many times. At rest it is the answer to
+noise that has passed, and what is taken back of it need not be cooled away."""
+CAUTION, AGREED_K = 1.0, 0.05
+"""An error is acted on but for so many standard deviations among the hypotheses beyond the latter.
+What they disagree in is heat on its way. When it has arrived they agree: nothing waits for ever."""
 
 
 class Outlook(NamedTuple):
@@ -62,12 +75,21 @@ class Outlook(NamedTuple):
         Total lag.
     gain : float
         Heating rate at full power in K/s.
+    heater_k : float
+        What the heater keeps back at full power, in K of the water.
+    surplus : float
+        Power that reaches the water, less the holding power.
+    spread_k : float
+        Standard deviation of `coasting_c` among the hypotheses.
     """
 
     coasting_c: float
     holding_power: float
     lag_s: float
     gain: float
+    heater_k: float = 0.0
+    surplus: float = 0.0
+    spread_k: float = 0.0
 
 
 def outlook(
@@ -76,21 +98,25 @@ def outlook(
     """Return the weighted means; `bounds` are the least and the most power."""
     x = block[:, X]
     beta = x[BETA]
-    means = np.empty((4, len(share)))
-    coasting, holding = means[0], means[1]
+    means = np.empty((7, len(share)))
+    coasting, holding, _, _, heater, surplus, squares = means
     np.divide(x[D], beta, out=holding)
     np.maximum(holding, bounds[0], out=holding)
     np.minimum(holding, bounds[1], out=holding)
-    np.subtract(path.heat, holding, out=coasting)
-    coasting *= hypotheses.element
+    np.subtract(path.heat, holding, out=surplus)
+    np.multiply(surplus, hypotheses.element, out=coasting)
     coasting += path.pending
     coasting -= hypotheses.dead_periods * holding
     coasting *= beta
     coasting += x[T]
     means[2] = hypotheses.lag_s
     means[3] = beta
-    coasting_c, holding_power, lag_s, gain = means.dot(share).tolist()
-    return Outlook(coasting_c, holding_power, lag_s, gain / hypotheses.period_s)
+    np.multiply(hypotheses.element, beta, out=heater)
+    np.multiply(coasting, coasting, out=squares)
+    coasting_c, holding_power, lag_s, gain, heater_k, away, square = means.dot(share).tolist()
+    spread_k = math.sqrt(max(square - coasting_c * coasting_c, 0.0))
+    rate = gain / hypotheses.period_s
+    return Outlook(coasting_c, holding_power, lag_s, rate, heater_k, away, spread_k)
 
 
 def power_for(
@@ -121,13 +147,34 @@ def power_for(
     ramp_power : float
         What lets the water rise with a ramp, beside the holding power.
     """
-    calm = calmness * clamp(outlook.gain * outlook.lag_s / HEAVY_K, 1.0, CALMER)
-    Tc_s = max(FASTEST_S, FASTEST_PERIODS * period_s, calm * outlook.lag_s)
+    heavy = clamp(outlook.gain * outlook.lag_s / HEAVY_K, 1.0, CALMER)
+    Tc_s = max(FASTEST_S, FASTEST_PERIODS * period_s, calmness * heavy * outlook.lag_s)
     tau_s = SMOOTHNESS * Tc_s
     resting = outlook.holding_power + ramp_power
     aim_c = outlook.coasting_c + outlook.gain * tau_s * (before - resting)
-    wanted = resting + (setpoint_c - aim_c) / (outlook.gain * Tc_s)
+    surplus = outlook.surplus - ramp_power
+    aim_c += outlook.heater_k * (_counted(surplus, heavy) - surplus)
+    error_k = _agreed(setpoint_c - aim_c, outlook.spread_k, bounds)
+    wanted = resting + error_k / (outlook.gain * Tc_s)
     return clamp(before + (wanted - before) * period_s / (period_s + tau_s), *bounds)
+
+
+def _counted(surplus: float, heavy: float) -> float:
+    """Return as how much the heat in the heater counts, for a surplus of power of `surplus`."""
+    moving = 1.0 + CARRIED * (heavy - EVEN)
+    size = abs(surplus)
+    return math.copysign(max(moving * size, min(AT_REST * size, AT_REST * REST)), surplus)
+
+
+def _agreed(error_k: float, spread_k: float, bounds: tuple[float, float]) -> float:
+    """Return what is left of an error on whose size the hypotheses do not agree.
+
+    Where power can only heat, water that is too hot is so whatever they say.
+    """
+    doubt_k = CAUTION * max(spread_k - AGREED_K, 0.0)
+    if error_k < 0.0 and bounds[0] >= 0.0:
+        return error_k
+    return math.copysign(max(abs(error_k) - doubt_k, 0.0), error_k)
 
 
 def ahead(

@@ -81,10 +81,10 @@ class AdaptiveBelief:
 class Adaptive:
     r"""Learn any plant with a bank of Kalman filters; nothing has to be tuned.
 
-    48 hypotheses about lag and its shape each learn water temperature, loss and gain; they are
+    72 hypotheses about lag and its shape each learn water temperature, loss and gain; they are
     weighted by how well they predicted. The power cancels the error of the temperature at which
     the water would come to rest, within :math:`T_c = \max(3\,\mathrm{s}, 1.5\,h, \kappa L)`, or up
-    to twice that where full power has much heat under way.
+    to three times that where full power has much heat under way.
 
     Parameters
     ----------

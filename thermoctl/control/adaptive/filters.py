@@ -127,11 +127,12 @@ def restarted(block: Block, hypotheses: Hypotheses, y_c: float) -> Block:
 def predicted(
     block: Block, heat: Array, hypotheses: Hypotheses, drift: Drift, unrest: float = 0.0
 ) -> Block:
-    """Return the block one period later: T' = T - d + beta q, z' = z + a (T - z) + c (T' - T).
+    """Return the block one period later.
 
-    That is exact for water that warms evenly within a period; `heat` is q in the mean of it. Where
-    a period is as long as the lag, a sensor that knew of T alone would show nothing before the next
-    one, and no hypothesis would fit. `unrest` is how far the power was from what holds the water.
+    T' = T - d + beta q and z' = z + a (T - z) + c (T' - T), exact for water that warms evenly
+    within a period; `heat` is q in the mean of it. Where a period is as long as the lag, a sensor
+    that knew of T alone would show nothing before the next one, and no hypothesis would fit.
+    `unrest` is how far the power was from what holds the water.
     """
     after = block.copy()
     _move(after, heat, hypotheses)  # F [P | x]

@@ -102,7 +102,7 @@ def _judged(bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:
 
 
 def foretold(law: Bank, belief: BankBelief, y_c: float, applied: float) -> float:
-    """Return the log likelihood of `y_c` after `applied`, before the bank has seen either."""
+    """Return the log likelihood of the reading `y_c`, before it is seen."""
     if belief.block is None:
         return 0.0
     block = law.foreseen(belief.block, belief, applied)
