@@ -34,6 +34,8 @@ class KnownLoad:
     def want(self, power: float, duration_s: float) -> None:
         """Expect `power`, of full power, for `duration_s` from the next sample on.
 
+        A load of 0 ends the one before at that sample, however long it was to last.
+
         Raises
         ------
         Refused
@@ -45,7 +47,10 @@ class KnownLoad:
             raise Refused(
                 f"expected a duration above 0, up to {LONGEST_S:.0f} s, got {duration_s!r}"
             )
-        self._wanted = float(power), float(duration_s)
+        if power == 0.0:
+            self._wanted = 0.0, 0.0
+            return
+        self._wanted, self._told = (float(power), float(duration_s)), True
         self._emit("load.changed", power=float(power), duration_s=float(duration_s))
 
     def at(self, t_s: float) -> float:
@@ -53,7 +58,7 @@ class KnownLoad:
         if self._wanted is not None:
             self._power, duration_s = self._wanted
             self._begin_s, self._end_s = t_s, t_s + duration_s
-            self._wanted, self._told = None, True
+            self._wanted = None
         if t_s >= self._end_s and self._told:
             self._told = False
             self._emit("load.changed", power=0.0, duration_s=0.0)

@@ -93,4 +93,7 @@ class Wishes:
 
     def want_power(self, power: float) -> None:
         """Give `power`, a fraction of what the loop can take, in mode manual."""
-        self.manual_power = self._limits.accept_power(power)
+        accepted = self._limits.accept_power(power)
+        if accepted != self.manual_power:
+            self._emit("output.changed", before_power=self.manual_power, after_power=accepted)
+        self.manual_power = accepted

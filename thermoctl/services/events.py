@@ -99,6 +99,7 @@ _BY_LEVEL: Final = {
         "model.recalled",
         "model.trusted",
         "orders.changed",
+        "output.changed",
         "plant.changed",
         "request.refused",
         "setpoint.changed",

@@ -64,6 +64,24 @@ def test_the_power_is_raised_in_the_same_step_and_lowered_when_the_time_is_over(
     ]
 
 
+@pytest.mark.parametrize("pause", [0, 3])
+def test_a_load_of_0_ends_the_one_before_and_is_told_once(warm, pause):
+    warm.regulator.request(Load(LOAD, 600.0))
+    for _ in range(pause):
+        warm.step()
+    warm.regulator.request(Load(0.0, 1.0))
+    first = len(warm.steps)
+    assert [warm.step().load for _ in range(3)] == [0.0] * 3
+    told = [each for step in warm.steps[first:] for each in step.events]
+    ends = [dict(each.fields) for each in told if each.fields["power"] == 0.0]
+    assert ends == [{"power": 0.0, "duration_s": 0.0}]
+
+
+def test_a_load_of_0_where_there_is_none_is_no_event(warm):
+    warm.regulator.request(Load(0.0, 1.0))
+    assert [warm.step().events for _ in range(3)] == [()] * 3
+
+
 def test_a_load_never_takes_the_power_beyond_its_limit(drive_with):
     drive = drive_with(power_max=0.3)
     drive.run(300)

@@ -81,6 +81,21 @@ def test_every_change_is_an_event(warm):
     assert names == ["setpoint.changed", "mode.changed"]
 
 
+def test_a_power_by_hand_is_an_event_with_the_power_before_it(warm):
+    warm.regulator.request(Mode.MANUAL)
+    carried = warm.step().command.power
+    warm.regulator.request(ManualPower(0.3))
+    (event,) = warm.step().events
+    assert event.name == "output.changed"
+    assert dict(event.fields) == {"before_power": carried, "after_power": 0.3}
+
+
+def test_a_power_that_is_refused_is_no_event(warm):
+    with pytest.raises(Refused):
+        warm.regulator.request(ManualPower(1.5))
+    assert warm.step().events == ()
+
+
 def test_a_loop_that_starts_in_manual_starts_at_power_0(drive_with):
     drive = drive_with(water_c=20.0, mode="manual")
     assert drive.run(10).command.power == 0.0
@@ -89,6 +104,7 @@ def test_a_loop_that_starts_in_manual_starts_at_power_0(drive_with):
 def test_what_does_not_change_is_no_event(warm):
     warm.regulator.request(SetPoint(37.5))
     warm.regulator.request(Mode.AUTO)
+    warm.regulator.request(ManualPower(0.0))
     assert warm.step().events == ()
 
 

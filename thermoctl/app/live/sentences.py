@@ -75,6 +75,10 @@ _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
     "loop.started": (Mark.NONE, ("Loop started at {temperature_c}", "Loop started")),
     "loop.stopped": (Mark.NONE, ("Loop stopped, heater off",)),
     "mode.changed": (Mark.NONE, ("Mode {after}, was {before}", "Mode changed")),
+    "output.changed": (
+        Mark.NONE,
+        ("Power {after_power} by hand, was {before_power}", "Power by hand changed"),
+    ),
     "output.nan": (Mark.WARNING, ("No number from {controller}: power 0", "No number: power 0")),
     "output.readback": (Mark.WARNING, ("Output differs: {text}", "Output differs from command")),
     "output.refused": (Mark.WARNING, ("Output refused: {text}", "Output refused")),

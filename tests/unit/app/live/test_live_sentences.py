@@ -12,6 +12,11 @@ def test_a_known_event_becomes_a_sentence_with_units() -> None:
     assert (said.t_s, said.name, said.mark) == (3.0, "setpoint.changed", Mark.NONE)
 
 
+def test_a_power_by_hand_is_told_in_per_cent() -> None:
+    said = sentence(Event(3.0, "output.changed", {"before_power": 0.0, "after_power": 0.3}))
+    assert said.text == "Power 30.0\u00a0% by hand, was 0.0\u00a0%"
+
+
 def test_a_known_event_without_its_fields_is_still_a_sentence() -> None:
     for name in _SENTENCES:
         text = sentence(Event(0.0, name)).text
