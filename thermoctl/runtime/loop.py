@@ -31,6 +31,8 @@ SUSPENDED_S = 3.0
 """A wake later than this means the machine slept: power 0 before anything else."""
 FRESH_S = 3.0
 """A sample older than this, or than one and a half periods of a slow loop, is STALE."""
+AWAITED_S = 10.0
+"""How long the first step waits for boards that are being opened for the first time."""
 _EVENTS = 256
 
 Publish = Callable[[Cycle], None]
@@ -78,6 +80,7 @@ class Loop:
         self._sound = True
         self._failure = ""
         self._stopping = False
+        self._begun_s = math.inf
         self.cycles = 0
         self.missed = 0
 
@@ -156,6 +159,8 @@ class Loop:
             self.report("cycle.late", late_s=late_s)
         self._grant_requests()
         samples = {id(board): self._read(board) for board in self.boards}
+        if self._awaits():
+            return  # no reading is missing yet, and no output is on
         seen = {w.name: self._see(w, samples) for w in self.wirings}
         led = {w.name: self._led(w, w.lead, seen) for w in self.wirings if w.lead is not None}
         walked = []
@@ -168,6 +173,15 @@ class Loop:
         events = self.take_events()
         for wiring, step, tick_us in walked:
             self._hand_out(wiring, step, events, accepted[wiring.name], tick_us, late_s)
+
+    def _awaits(self) -> bool:
+        """Return whether a board is being opened for the first time, and is not late yet.
+
+        All loops wait for it: one that follows another must not begin before its master.
+        """
+        now_s = self._clock.now_s()
+        self._begun_s = min(self._begun_s, now_s)
+        return now_s - self._begun_s < AWAITED_S and any(each.awaited for each in self.boards)
 
     def _read(self, board: Connection) -> Mapping[str, RawSample]:
         try:

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import threading
 
 import pytest
 
@@ -22,7 +23,7 @@ COLD = 600.0  # counts of 1024 at 5 V: 19.8 degC
 class Bench:
     """A loop on one scripted board, and what it published."""
 
-    def __init__(self, *boards, **keys):
+    def __init__(self, *boards, beside=False, **keys):
         self.clock = boards[0]._clock if boards else ManualClock()
         self.cycles, self.completed = [], 0
         self.built = 0
@@ -30,7 +31,7 @@ class Bench:
         regulator = regulator_for(load({"loops": {"tank": LOOP | keys}}))
         reports = []
         self.connection = Connection(
-            "daq", self._build, self.clock, lambda *a, **k: reports[0](*a, **k), beside=False
+            "daq", self._build, self.clock, lambda *a, **k: reports[0](*a, **k), beside=beside
         )
         wiring = Wiring(
             "tank",
@@ -207,3 +208,63 @@ def test_a_reader_that_stops_the_loop_ends_it_within_the_cycle():
     bench.loop._publish = lambda cycle: bench.loop.stop()
     bench.loop.run()
     assert bench.loop.cycles == 1
+
+
+class Slow(ScriptedBoard):
+    """A board whose opening waits for `go`."""
+
+    def __init__(self, clock, **options):
+        super().__init__(clock, [COLD], **options)
+        self.go = threading.Event()
+
+    def open(self, deadline_s):
+        self.go.wait(10.0)
+        return super().open(deadline_s)
+
+
+def test_nothing_is_told_of_a_loop_before_its_board_has_been_opened_for_the_first_time():
+    board = Slow(ManualClock())
+    bench = Bench(board, beside=True)
+    bench.loop.run(until_s=4.0)
+    assert (bench.cycles, bench.completed) == ([], 5)
+    board.go.set()
+    bench.connection._opening.join()
+    assert bench.run(3).step.command.power == 1.0
+    assert bench.events() == ["board.opened"]
+    assert bench.loop.shut_down() is True
+
+
+def test_a_board_that_hangs_in_its_first_opening_is_waited_for_ten_seconds():
+    board = Slow(ManualClock())
+    bench = Bench(board, beside=True)
+    bench.loop.run(until_s=9.5)
+    assert bench.cycles == []
+    last = bench.run(10)
+    assert last.step.state is State.SAFE
+    assert "sensor.missing" in bench.events()
+    board.go.set()
+    bench.loop.shut_down()
+
+
+class Refusing(Slow):
+    """A board that cannot be opened, once `go` lets it try."""
+
+    def open(self, deadline_s):
+        super().open(deadline_s)
+        raise LinkError("no such port")
+
+
+def test_a_board_that_cannot_be_opened_is_told_by_name_as_soon_as_that_is_known():
+    board = Refusing(ManualClock())
+    bench = Bench(board, beside=True)
+    bench.loop.cycle(0.0)
+    board.go.set()
+    bench.connection._opening.join()
+    bench.loop.cycle(0.0)
+    (cycle,) = bench.cycles
+    assert cycle.step.state is State.SAFE
+    assert {"board.retry", "board.lost"} <= set(bench.events())
+    assert [event.fields["board"] for event in cycle.step.events if "board" in event.fields] == [
+        "daq"
+    ]
+    assert cycle.step.alarms[0].text == "board 'daq': no such port"

@@ -122,6 +122,7 @@ class Daemon:
         self._insight = InsightService(insights_for(settings.loops), self._emit)
         self._clients = self._control_socket(directory, socket)
         self._off = self._failed = self._ready = False
+        self._status_at = 0
         self._unreached: list[str] = []
         self._ending = self._reloading = False
         # A service reloads at a hang-up; who started it by hand and closed the terminal is gone.
@@ -256,7 +257,8 @@ class Daemon:
             self._ready = True
             self._notifier.ready()
         self._notifier.watchdog()
-        if self._loop.cycles % _STATUS_EVERY == 1:
+        if self._seen.cycles and self._loop.cycles >= self._status_at:
+            self._status_at = self._loop.cycles + _STATUS_EVERY
             self._notifier.status(", ".join(_words(each) for each in self._seen.cycles.values()))
 
     def _acknowledged_on_disk(self, loop: str) -> None:
