@@ -83,6 +83,18 @@ def test_bad_names_are_refused_with_the_list_of_what_there_is(arguments, words, 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("text", ["foo", "on-off:hysteresis=1", "on-off:hysteresis_k=-1"])
+def test_a_controller_typed_wrongly_is_wrong_usage(text, tmp_path):
+    done = run(*BRIEF, "--controller", "on-off", "--controller", text, "--out", tmp_path)
+    assert done.exit_code == 2
+    assert "--controller" in done.output
+
+
+def test_a_controller_that_there_is_not_is_told_with_those_there_are(tmp_path):
+    said = run(*BRIEF, "--controller", "foo", "--out", tmp_path).output
+    assert re.search("no controller is called 'foo'; known: .*adaptive.*on-off", said, re.DOTALL)
+
+
 def test_a_loop_that_may_not_be_so_warm_is_refused(tmp_path):
     text = profile("aquarium").read_text(encoding="utf-8")
     cold = tmp_path / "cold.toml"

@@ -264,7 +264,10 @@ def _contenders(
         _check_setpoints(table, fleet, fitted=fitted)
     made = partial(contender, table=table, nameplate=nameplate, fitted=fitted)
     if texts:
-        return [made(text) for text in dict.fromkeys(texts)]
+        try:
+            return [made(text) for text in dict.fromkeys(texts)]
+        except BadOption as wrong:  # typed, and in no file
+            raise click.BadParameter(str(wrong), param_hint="--controller") from wrong
     there = []
     for text in USUAL:
         try:
