@@ -1,5 +1,6 @@
 """``thermoctl off``: power 0 when no daemon is there to do it."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -42,4 +43,6 @@ def test_a_board_that_is_not_there_is_told_of_and_is_no_success(off, tmp_path):
 def test_a_daemon_that_runs_is_left_alone(off, tmp_path):
     with DaemonLock(tmp_path / "state" / "daemon.lock"):
         result = off(CONFIG / "aquarium.toml")
-    assert "holds it" in str(result.exception)
+    said = str(result.exception)
+    assert f"a daemon is running (process {os.getpid()} " in said
+    assert "thermoctl mode off ends its heat, or stop it first" in said

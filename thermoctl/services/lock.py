@@ -12,6 +12,8 @@ from urllib.parse import quote
 from thermoctl.errors import NotPermitted, Unavailable
 
 LONGEST: Final = 64
+STOP_IT: Final = "stop it first: systemctl stop thermoctl, or Ctrl-C where it was started"
+"""What to do about a daemon that is in the way."""
 
 
 def device_lock_path(directory: Path, device: str) -> Path:
@@ -25,10 +27,17 @@ class DaemonLock:
     The kernel lets the lock go with the process, however it ends, so a file that was left behind
     never keeps anybody out. The file itself stays: removing it would let two processes lock two
     files of the same name.
+
+    Parameters
+    ----------
+    path : Path
+        The lock file.
+    remedy : str
+        What whoever finds it held is told to do.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = Path(path)
+    def __init__(self, path: Path, remedy: str = STOP_IT) -> None:
+        self._path, self._remedy = Path(path), remedy
         self._descriptor: int | None = None
 
     def acquire(self) -> None:
@@ -60,7 +69,7 @@ class DaemonLock:
             holder = os.pread(descriptor, LONGEST, 0).decode(errors="replace").strip() or "unknown"
             os.close(descriptor)
             raise Unavailable(
-                f"expected to be alone with {self._path}, but process {holder} holds it"
+                f"a daemon is running (process {holder} holds {self._path}); {self._remedy}"
             ) from None
         except OSError as error:
             os.close(descriptor)

@@ -32,8 +32,15 @@ def holder(tmp_path):
 
 
 def test_the_second_daemon_is_refused_and_told_who_holds_it(tmp_path, holder):
-    with pytest.raises(Unavailable, match=f"process {holder.pid} holds it"):
+    with pytest.raises(Unavailable, match=f"process {holder.pid} holds .*daemon.lock") as refused:
         DaemonLock(tmp_path / "daemon.lock").acquire()
+    assert "a daemon is running" in str(refused.value)
+    assert "stop it first" in str(refused.value)
+
+
+def test_who_finds_a_lock_held_is_told_what_to_do(tmp_path, holder):
+    with pytest.raises(Unavailable, match=r"; ask it$"):
+        DaemonLock(tmp_path / "daemon.lock", "ask it").acquire()
 
 
 def test_a_killed_holder_keeps_nobody_out(tmp_path, holder):

@@ -17,9 +17,11 @@ from thermoctl.app.daemon.daemon import locks_of, state_for
 from thermoctl.app.settings import default_files, load_all
 from thermoctl.errors import DriverError
 from thermoctl.runtime.clock import MonotonicClock
+from thermoctl.services.lock import STOP_IT
 from thermoctl.services.places import make_private
 
 OPEN_S = 3.0
+_ASK_IT = f"thermoctl mode off ends its heat, or {STOP_IT}"
 
 
 @click.command()
@@ -32,7 +34,7 @@ def off(configs: tuple[Path, ...], state: Path | None) -> int:
     """
     settings = load_all(list(configs) or default_files())
     with ExitStack() as stack:
-        for lock in locks_of(settings, make_private(state_for(settings, state))):
+        for lock in locks_of(settings, make_private(state_for(settings, state)), _ASK_IT):
             stack.enter_context(lock)
         told = [_switch_off(name, board) for name, board in settings.boards.items()]
     return 0 if all(told) else 1

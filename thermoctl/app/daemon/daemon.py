@@ -33,7 +33,7 @@ from thermoctl.services.history.writer import HistoryWriter
 from thermoctl.services.journal import Journal, sink_for
 from thermoctl.services.latches import LatchKeeper
 from thermoctl.services.learned import LearnedStore, ModelKeeper, remembered_models
-from thermoctl.services.lock import DaemonLock, device_lock_path
+from thermoctl.services.lock import STOP_IT, DaemonLock, device_lock_path
 from thermoctl.services.notify import Notifier, watchdog_interval_s
 from thermoctl.services.places import make_private, runtime_dir, state_dir
 from thermoctl.services.store import LatchStore
@@ -54,12 +54,12 @@ def state_for(settings: Settings, given: Path | None) -> Path:
     return given or (Path(configured) if configured else state_dir())
 
 
-def locks_of(settings: Settings, state: Path) -> list[DaemonLock]:
+def locks_of(settings: Settings, state: Path, remedy: str = STOP_IT) -> list[DaemonLock]:
     """Return the locks of who drives these boards: state folder and ports."""
     run_directory = make_private(runtime_dir())
     ports = [board.port for board in settings.boards.values() if hasattr(board, "port")]
-    devices = [DaemonLock(device_lock_path(run_directory, port)) for port in ports]
-    return [DaemonLock(state / "daemon.lock"), *devices]
+    devices = [DaemonLock(device_lock_path(run_directory, port), remedy) for port in ports]
+    return [DaemonLock(state / "daemon.lock", remedy), *devices]
 
 
 @dataclass(slots=True)

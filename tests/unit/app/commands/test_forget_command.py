@@ -41,6 +41,8 @@ def test_while_a_daemon_runs_it_is_refused_and_nothing_is_lost(store):
     with DaemonLock(store.path_of("tank").parent / "daemon.lock"):
         told = call(store)
     assert isinstance(told.exception, Unavailable)
+    assert "a daemon is running" in str(told.exception)
+    assert "stop it first" in str(told.exception)
     assert set(store.load("tank")[0]) == {"adaptive"}
 
 
