@@ -55,10 +55,10 @@ class Row:
 
 RIG = (
     Row("warm-up and an hour of melting ice", 4800, judged_s=3600, overshoot_k=0.08,
-        settled_s=520, deviation_mk=18.0, travel_per_min=0.65),
+        settled_s=450, deviation_mk=16.0, travel_per_min=0.55),
     Row("that hour's largest deviation", 4800, at_s=1200, largest_k=0.1, seed=32),
     Row("step to 40 degC", 2000, at_s=1200, asked=SetPoint(40.0), setpoint_c=40.0,
-        overshoot_k=0.1, settled_s=150),
+        overshoot_k=0.06, settled_s=110),
     Row("a litre of cold water", 2000, at_s=1200, befalls=(("cold-water", 1.0),),
         overshoot_k=0.12, settled_s=170),
     Row("a spike of 20 K", 1800, at_s=1200, befalls=(("spike", 20.0),), largest_k=0.1),
