@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.measure import Measurement
 from rich.table import Table
 
 from thermoctl.studies.experiment import Measures
@@ -20,6 +19,7 @@ from thermoctl.studies.orders import Weighing
 from thermoctl.studies.orders_words import orders_json, orders_lines, orders_rows
 from thermoctl.studies.record import Record
 from thermoctl.studies.replay import Replay
+from thermoctl.studies.tables import print_whole, width_of
 from thermoctl.studies.words import ascii_only, counted, duration, is_utf8, number, probability
 
 Spelling = Callable[[str], str]
@@ -192,17 +192,11 @@ def _parameter_tables(result: Replay, spell: Spelling) -> tuple[Table, Table]:
 
 def print_table(console: Console, table: Table, otherwise: Table | None = None) -> None:
     """Print a table whole, or `otherwise` where only that one fits the terminal."""
-    roomy = console.options.update(width=10_000)
-    widths = [Measurement.get(console, roomy, each).maximum for each in (table, otherwise or table)]
-    if widths[0] > console.width and widths[1] < widths[0]:
-        table, widths = otherwise or table, widths[::-1]
-    terminal = console.width
-    console.width = max(terminal, widths[0])  # a terminal wraps a row, rich would cut it
-    try:
-        console.print()
-        console.print(table, soft_wrap=True)
-    finally:
-        console.width = terminal
+    width = width_of(console, table)
+    if otherwise is not None and width > console.width and width_of(console, otherwise) < width:
+        table = otherwise
+    console.print()
+    print_whole(console, table)
 
 
 def _warnings(result: Replay) -> list[str]:
@@ -251,7 +245,7 @@ def print_experiment(console: Console, title: str, measures: Measures) -> None:
     for name, value, unit in rows:
         known = ("–", why) if value is None else (value.replace("-", "−"), unit)
         table.add_row(name, *map(spell, known))
-    console.print(table)
+    print_whole(console, table)
 
 
 def _measure_rows(measures: Measures) -> list[tuple[str, str | None, str]]:

@@ -14,7 +14,8 @@ from thermoctl.studies.compare.goals import STATISTICS, Goal
 from thermoctl.studies.compare.plants import FLEETS
 from thermoctl.studies.compare.score import MEASURES
 from thermoctl.studies.compare.summary import Line, Score
-from thermoctl.studies.words import ascii_only, is_utf8
+from thermoctl.studies.present import print_lines, spelling
+from thermoctl.studies.tables import print_whole
 
 MISSED = "▲"
 """Marks a figure that misses its goal."""
@@ -62,39 +63,26 @@ def print_table(console: Console, lines: Sequence[Line], controllers: Sequence[s
     controllers : sequence of str
         Names, in the order of the columns; the verdict is on the first.
     """
-    terminal = console.width
     for fleet in dict.fromkeys(line.fleet for line in lines):
         own = [line for line in lines if line.fleet == fleet]
         table = _table(console, own, controllers)
         runs = max(score.runs for line in own for score in line.scores.values())
         of = f"{runs} plants" if runs > 1 else "1 plant"
-        _print(console, f"{fleet}: {FLEETS[fleet].text}; {of}")
-        try:
-            console.width = max(terminal, 10_000)  # a terminal wraps a row, rich would cut it
-            console.print(table, soft_wrap=True)
-        finally:
-            console.width = terminal
-        _print(console, "")
+        print_lines(console, [f"{fleet}: {FLEETS[fleet].text}; {of}"])
+        print_whole(console, table, keys=2)
+        print_lines(console, [""])
     text = f"Median / 95 % of the plants; × is times the bound, {MISSED} misses a goal"
-    _print(console, f"{text}; the verdict is on {controllers[0]}.")
-
-
-def _print(console: Console, text: str) -> None:
-    console.print(_spelt(console, text), markup=False, soft_wrap=True)
-
-
-def _spelt(console: Console, text: str) -> str:
-    """Return `text` as the console can show it."""
-    return text if is_utf8(console.encoding) else ascii_only(text)
+    print_lines(console, [f"{text}; the verdict is on {controllers[0]}."])
 
 
 def _table(console: Console, lines: Sequence[Line], controllers: Sequence[str]) -> Table:
+    spell = spelling(console)
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
     headings = ["scenario", "measure", "bound", "goal", *map(_heading, controllers), "verdict"]
     for place, heading in enumerate(headings):
         words = place in (0, 1, len(headings) - 1)
         table.add_column(
-            _spelt(console, heading),
+            spell(heading),
             justify="left" if words else "right",
             no_wrap=True,
             vertical="bottom",
@@ -111,7 +99,7 @@ def _table(console: Console, lines: Sequence[Line], controllers: Sequence[str]) 
             *cells,
             "–" if first is None else verdict(first),
         ]
-        table.add_row(*(_spelt(console, cell) for cell in row))
+        table.add_row(*(spell(cell) for cell in row))
         scenario = line.scenario
     return table
 
