@@ -34,7 +34,7 @@ def print_whole(console: Console, table: Table, keys: int = 1) -> None:
 
 
 def width_of(console: Console, table: Table) -> int:
-    """Return how many columns of the terminal `table` takes when nothing of it is cut."""
+    """Return how many characters wide `table` is when nothing of it is cut."""
     return Measurement.get(console, console.options.update(width=_ROOMY), table).maximum
 
 

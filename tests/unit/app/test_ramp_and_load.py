@@ -5,7 +5,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from thermoctl.app.commands.control import _POWER, _RATE, load, mode
+from thermoctl.app.commands.control import _POWER, _RATE, _TEMPERATURE, load, mode
 from thermoctl.app.daemon.clerk import Clerk
 from thermoctl.services.control_protocol import Call, CallError, asking, parse
 from thermoctl.signals import Load, SetPoint
@@ -47,6 +47,21 @@ def test_a_rate_has_its_unit(text, k_per_min):
 def test_a_rate_without_a_unit_that_is_known_is_refused(text):
     with pytest.raises(Exception, match="expected a rate above 0"):
         _RATE.convert(text, None, None)
+
+
+@pytest.mark.parametrize(
+    ("text", "value_c"),
+    [("40", 40.0), ("40C", 40.0), ("40 degC", 40.0), ("40°C", 40.0), ("104F", 40.0),
+     ("104 degF", 40.0), ("313.15K", 40.0), ("-5c", -5.0), ("4e1 °C", 40.0)],
+)  # fmt: skip
+def test_a_temperature_may_wear_its_unit(text, value_c):
+    assert _TEMPERATURE.convert(text, None, None) == pytest.approx(value_c)
+
+
+@pytest.mark.parametrize("text", ["", "C", "warm", "nan", "inf", "1e400", "40W", "40 ms", "40CF"])
+def test_what_is_no_temperature_is_refused_with_how_one_is_written(text):
+    with pytest.raises(Exception, match=r"expected a temperature in degC such as 65\.0, 65C"):
+        _TEMPERATURE.convert(text, None, None)
 
 
 def test_a_load_may_be_negative():

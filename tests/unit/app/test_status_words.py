@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 import pytest
 
-from thermoctl.app.commands.control import _described
+from thermoctl.app.commands.control import _described, _line
 from thermoctl.app.cycle_record import cycle_record
 from thermoctl.app.sim import bench_settings, simulate
 from thermoctl.signals import ShadowScore
@@ -45,6 +45,12 @@ def test_a_ramp_says_where_it_is_while_the_controller_follows_it(record):
     assert rows(record | way)["Set point"] == "40.00 °C, ramp at 25.80 °C"
     assert rows(record | way | {"mode": "off"})["Set point"] == "40.00 °C"
     assert rows(record | way | {"reference_c": 40.0})["Set point"] == "40.00 °C"
+
+
+def test_a_line_of_a_cycle_says_where_the_ramp_is_and_where_it_leads(record):
+    way = {"setpoint_c": 40.0, "reference_c": 25.8}
+    assert "set  40.00 °C, ramp at 25.80 °C  power" in _line(record | way)
+    assert "ramp" not in _line(record | way | {"reference_c": 40.0})
 
 
 def test_an_arrival_and_a_load_have_lines_only_while_there_are_any(record):

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Mapping
 from datetime import datetime
 from pathlib import Path
+from string import ascii_letters
 from typing import Any, Final
 
 import click
@@ -27,6 +28,7 @@ from thermoctl.app.commands.options import (
     loop_option,
     socket_option,
 )
+from thermoctl.app.configuration.units import celsius
 from thermoctl.app.daemon.insight_words import insight_lines
 from thermoctl.app.live import numbers
 from thermoctl.app.live.score import shadow_words
@@ -44,13 +46,14 @@ _REPLY_S: Final = 5.0  # beyond what the daemon itself gives its loop
 
 
 def _temperature(text: str) -> float:
-    """Return a temperature in degC; ``ValueError`` if it is no finite number."""
+    """Return a temperature in degC, written ``65``, ``65C`` or ``149F``; else ``ValueError``."""
+    digits = text.rstrip("°" + ascii_letters)
     try:
-        value_c = float(text)
+        value_c = celsius(float(digits), text[len(digits) :])
     except ValueError:
         value_c = math.nan
     if not math.isfinite(value_c):
-        raise ValueError(f"expected a temperature in degC such as 65.0, got {text!r}")
+        raise ValueError(f"expected a temperature in degC such as 65.0, 65C or 149F, got {text!r}")
     return value_c
 
 
@@ -138,7 +141,9 @@ def get(key: str, loop: str | None, socket: Path | None, as_json: bool) -> None:
 @click.command(
     "set",
     context_settings={"ignore_unknown_options": True},  # -5 is a temperature
-    epilog=examples("thermoctl set 65.0", "thermoctl set 65 --ramp 2/min --loop tank"),
+    epilog=examples(
+        "thermoctl set 65.0", "thermoctl set 149F", "thermoctl set 65 --ramp 2/min --loop tank"
+    ),
 )
 @click.argument("value_c", metavar="TEMPERATURE", type=_TEMPERATURE)
 @click.option("--ramp", type=_RATE, help="Go there at this rate: 2/min, 30K/h.")
@@ -358,7 +363,7 @@ def _line(record: Mapping[str, Any]) -> str:
     return _plain(
         f"{datetime.now():%H:%M:%S}  {record['loop']}  "
         f"{numbers.temperature(record['temperature_c']):>9}  "
-        f"set {numbers.temperature(record['setpoint_c']):>9}  "
+        f"set {numbers.temperature(record['setpoint_c']):>9}{_on_the_way(record)}  "
         f"power {numbers.power(record['power']):>7}  "
         f"{record['mode']} {record['state']}{alarms}"
     )

@@ -41,6 +41,28 @@ _OTHER: Final[dict[str, tuple[str, Callable[[float], float]]]] = {
 }
 
 
+def celsius(value: float, unit: str) -> float:
+    """Return a temperature in degC that was written in `unit`.
+
+    Parameters
+    ----------
+    value : float
+        The number that was written.
+    unit : str
+        C, F or K in letters of any size, with ° or deg before it or without; "" is °C.
+
+    Raises
+    ------
+    ValueError
+        It is no unit of temperature.
+    """
+    worn = unit.strip().lower().removeprefix("deg").removeprefix("°")
+    right, convert = ("c", _OTHER["degc"][1]) if worn in ("", "c") else _OTHER.get(worn, ("", None))
+    if right != "c" or convert is None:
+        raise ValueError(f"expected a unit of temperature, C, F or K, got {unit!r}")
+    return convert(value)
+
+
 def unit_of(key: str) -> str:
     """Return the unit that `key` wears, as ``°C`` for ``setpoint_c``, else ""."""
     parts = key.lower().split("_")
