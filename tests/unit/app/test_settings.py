@@ -348,6 +348,17 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
         load(tmp_path / "nowhere.toml")
 
 
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "a.toml")
+    with pytest.raises(ConfigError, match=r"a\.toml: expected a regular file, got a pipe"):
+        load(tmp_path / "a.toml")
+
+
+def test_a_device_is_refused():
+    with pytest.raises(ConfigError, match="/dev/zero: expected a regular file, got a device"):
+        load("/dev/zero")
+
+
 @pytest.mark.parametrize("content", [b"\xff\xfe", b"a = '\x80'"])
 def test_a_file_that_is_not_utf_8_is_refused(tmp_path, content):
     path = tmp_path / "a.toml"

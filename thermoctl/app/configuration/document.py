@@ -155,8 +155,11 @@ def _earlier(lines: Mapping[str, dict[KeyPath, int]], file: str, path: KeyPath) 
 
 def _text(file: Path) -> str:
     try:
-        with file.open(encoding="utf-8-sig") as stream:
+        with open(file, encoding="utf-8-sig", opener=_without_waiting) as stream:
             mode = os.fstat(stream.fileno()).st_mode
+            if not stat.S_ISREG(mode):
+                kind = "a pipe" if stat.S_ISFIFO(mode) else "a device"
+                raise ConfigError(f"{file}: expected a regular file, got {kind}")
             if mode & stat.S_IWOTH and os.geteuid() == 0:
                 raise ConfigError(
                     f"{file}: expected a file that only its owner may write to, got mode "
@@ -170,6 +173,11 @@ def _text(file: Path) -> str:
     except (OSError, UnicodeDecodeError) as error:
         got = getattr(error, "strerror", None) or error
         raise ConfigError(f"{file}: expected a readable TOML file in UTF-8, got: {got}") from error
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe that nobody writes to would be waited for otherwise."""
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _parsed(file: Path, text: str) -> dict[str, Any]:
