@@ -12,6 +12,7 @@ from thermoctl.quantities import Array
 from thermoctl.studies import figure as house
 from thermoctl.studies.excitation import Excitation
 from thermoctl.studies.orders_figure import draw_posterior
+from thermoctl.studies.plant_words import PlantWords
 from thermoctl.studies.replay_figure import draw_record
 from thermoctl.studies.tuning import Tuning
 from thermoctl.studies.tuning_limits import Proposal
@@ -26,6 +27,7 @@ _LABEL_GAP = 0.09
 _LINE_IN = 0.112
 """Height of a line of text below the panels."""
 _LAGS_SHOWN, _LEAST_SHOWN = 4.0, 30.0
+_UNHEARD = "The answer to full power is not known: the power moved too little, or not at all."
 
 
 def draw_tuning(
@@ -33,7 +35,8 @@ def draw_tuning(
 ) -> list[Path]:
     """Draw `tuning` of the run of `excitation` and write it to each of `paths`.
 
-    Below stand the `limits` that are proposed.
+    Below stand the `limits` that are proposed; of a plant that was not heard, no answer is drawn,
+    and why.
 
     Raises
     ------
@@ -45,10 +48,12 @@ def draw_tuning(
         If a file cannot be written.
     """
     chosen = () if tuning.given else _HEIGHTS_IN[2:3]
-    heights = [*_HEIGHTS_IN[:2], *chosen, _HEIGHTS_IN[3]]
-    spaces = [_TOP_IN, *[_CLOSE_IN] * (len(heights) - 2), _APART_IN]
-    below = limit_lines(limits)
-    foot_in = _LINE_IN * len(below)
+    answer = () if tuning.words is None else _HEIGHTS_IN[3:]
+    heights = [*_HEIGHTS_IN[:2], *chosen, *answer]
+    runs = len(heights) - len(answer)
+    spaces = [_TOP_IN, *[_CLOSE_IN] * (runs - 1), *[_APART_IN] * len(answer)]
+    below = limit_lines(limits)[1:] if answer else [_UNHEARD]
+    foot_in = _LINE_IN * (len(below) + 1) if below else 0.0
     height = sum(heights) + sum(spaces) + _BOTTOM_IN + foot_in
     with house.styled(house.WIDE_IN, height, len(heights), 1) as (figure, axes):
         panels = list(axes[:, 0])
@@ -56,14 +61,15 @@ def draw_tuning(
         for panel, space, own in zip(panels, spaces, heights, strict=True):
             top -= space + own
             panel.set_position((0.115, top / height, 0.75, own / height))
-        _draw_run(tuning, excitation, panels[:-1])
-        _draw_answer(tuning, panels[-1])
+        _draw_run(tuning, excitation, panels[:runs])
+        if tuning.words is not None:
+            _draw_answer(tuning, tuning.words, panels[-1])
         for index, panel in enumerate(panels):
             house.letter(panel, "abcd"[index])
         figure.align_ylabels(panels)
         if below:
             figure.text(
-                0.02, (foot_in - 0.5 * _LINE_IN) / height, "\n".join(below[1:]),
+                0.02, (foot_in - 0.5 * _LINE_IN) / height, "\n".join(below),
                 va="top", family="monospace", fontsize=6.0, linespacing=1.3, color=house.TEXT,
             )  # fmt: skip
         return [house.save(figure, path) for path in paths]
@@ -91,16 +97,10 @@ def _draw_run(tuning: Tuning, excitation: Excitation, panels: list[Any]) -> None
     panels[-1].set_xlabel(f"time, {unit}")
 
 
-def _draw_answer(tuning: Tuning, panel: Any) -> None:
+def _draw_answer(tuning: Tuning, words: PlantWords, panel: Any) -> None:
     """Draw how the temperature answers to full power, and the gain and lag of that answer."""
-    words = tuning.words
     panel.set_xlabel("time after full power, s")
     panel.set_ylabel("rise, K")
-    if words is None:
-        panel.set_yticks(())
-        panel.set_xticks(())
-        house.score(panel, "the record does not tell the answer to full power")
-        return
     lag_s = max(words.lag_s.value, 0.0)
     t, rise = _answer(tuning, max(_LAGS_SHOWN * lag_s, _LEAST_SHOWN * tuning.record.period_s))
     slope = words.gain_k_per_min.value / 60.0

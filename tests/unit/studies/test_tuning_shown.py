@@ -16,6 +16,7 @@ from thermoctl.studies.tuning_figure import draw_tuning
 from thermoctl.studies.tuning_words import tuning_json, tuning_lines
 
 PERIOD_S, DELAY = 2.0, 4
+SIGNAL = Excitation(0.0, 0.6, 35.5, 37.5, 1600.0, PERIOD_S, 0.06, 1)
 
 
 @pytest.fixture(scope="module")
@@ -55,18 +56,36 @@ def test_a_dead_time_is_the_delay_but_for_the_sample_every_answer_takes(tuning):
     assert row(tuning, "dead time") == "6 s in order 2,1,4"
 
 
-def test_the_answer_that_is_drawn_ends_on_gain_and_lag(tuning, monkeypatch):
-    drawn = []
+@pytest.fixture
+def drawn(monkeypatch):
+    """Return a function that draws a tuning and returns each panel's lines and the text below."""
+    kept = []
 
     def keep(figure, path):
-        drawn.extend(line.get_xydata() for line in figure.axes[-1].get_lines())
+        lines = [[line.get_xydata() for line in panel.get_lines()] for panel in figure.axes]
+        kept.extend((lines, [text.get_text() for text in figure.texts]))
         return path
 
+    def draw(tuning):
+        kept.clear()
+        draw_tuning(tuning, SIGNAL, [Path("unused.png")])
+        return kept
+
     monkeypatch.setattr(house, "save", keep)
-    signal = Excitation(0.0, 0.6, 35.5, 37.5, 1600.0, PERIOD_S, 0.06, 1)
-    draw_tuning(tuning, signal, [Path("unused.png")])
-    words, model = drawn
+    return draw
+
+
+def test_the_answer_that_is_drawn_ends_on_gain_and_lag(tuning, drawn):
+    words, model = drawn(tuning)[0][-1]
     assert model[-1] == pytest.approx(words[-1], rel=0.1)
+
+
+def test_of_a_plant_that_was_not_heard_no_answer_is_drawn_and_it_says_why(tuning, drawn):
+    heard = len(drawn(tuning)[0])
+    panels, below = drawn(replace(tuning, words=None))
+    assert len(panels) == heard - 1
+    assert all(panels)
+    assert "the power moved too little" in below[0]
 
 
 def test_parameters_are_not_told_of_a_plant_that_was_not_heard(tuning):
