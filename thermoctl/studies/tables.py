@@ -12,22 +12,20 @@ from rich.text import Text
 _ROOMY = 10_000
 
 
-def print_whole(console: Console, table: Table, keys: int = 1) -> None:
+def print_whole(console: Console, table: Table) -> None:
     """Print `table`; columns that a terminal has no room for follow below it.
 
-    Every part begins with the first `keys` columns, which say what a row is about. Into a file or a
-    pipe a row goes as one line, however long. No line ends in spaces.
+    Every part begins with the first columns, those of words, which say what a row is about. Into a
+    file or a pipe a row goes as one line, however long. No line ends in spaces.
 
     Parameters
     ----------
     console : Console
         Where to.
     table : Table
-        Has no box; a column is as wide as its widest cell.
-    keys : int
-        Columns that are repeated, from 1 on.
+        Has no box; a column is as wide as its widest cell. Words stand left, figures right.
     """
-    for place, part in enumerate(_parts(console, table, keys) if console.is_terminal else [table]):
+    for place, part in enumerate(_parts(console, table) if console.is_terminal else [table]):
         if place:
             console.print()
         _print(console, part)
@@ -38,11 +36,13 @@ def width_of(console: Console, table: Table) -> int:
     return Measurement.get(console, console.options.update(width=_ROOMY), table).maximum
 
 
-def _parts(console: Console, table: Table, keys: int) -> list[Table]:
+def _parts(console: Console, table: Table) -> list[Table]:
     """Return tables that fit `console`, each with as many columns as go in; at least one."""
-    first, parts = list(range(keys)), []
+    figures = [place for place, column in enumerate(table.columns) if column.justify == "right"]
+    first = list(range(max(1, figures[0]) if figures else 1))
+    parts: list[Table] = []
     chosen: list[int] = []
-    for place in range(keys, len(table.columns)):
+    for place in range(len(first), len(table.columns)):
         wider = _of_columns(table, [*first, *chosen, place])
         if chosen and width_of(console, wider) > console.width:
             parts.append(_of_columns(table, [*first, *chosen]))

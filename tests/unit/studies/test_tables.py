@@ -8,24 +8,24 @@ from rich.table import Table
 
 from thermoctl.studies.tables import print_whole, width_of
 
-NAMES = ("one", "two\nlines", "three", "four")
+NAMES = ("what", "one", "two\nlines", "three", "four")
 ROWS = [(f"row {row}", *(f"{row}.{place} ± 0.5 " for place in range(4))) for row in range(3)]
 
 
-def a_table():
+def a_table(words=1):
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
-    table.add_column("what", no_wrap=True)
-    for name in NAMES:
-        table.add_column(name, justify="right", no_wrap=True, vertical="bottom")
+    for place, name in enumerate(NAMES):
+        justify = "left" if place < words else "right"
+        table.add_column(name, justify=justify, no_wrap=True, vertical="bottom")
     for row in ROWS:
         table.add_row(*row)
     return table
 
 
-def printed(width, *, terminal=True, keys=1):
+def printed(width, *, terminal=True, words=1):
     file = io.StringIO()
     console = Console(file=file, width=width, force_terminal=terminal, color_system=None)
-    print_whole(console, a_table(), keys)
+    print_whole(console, a_table(words))
     return file.getvalue()
 
 
@@ -63,8 +63,10 @@ def test_no_line_ends_in_spaces(terminal):
         assert line == line.rstrip()
 
 
-def test_two_columns_may_say_what_a_row_is_about():
-    for part in printed(45, keys=2).split("\n\n"):
+def test_every_column_of_words_before_the_figures_says_what_a_row_is_about():
+    parts = printed(45, words=2).split("\n\n")
+    assert len(parts) > 1
+    for part in parts:
         assert "0.0 ± 0.5" in part
 
 

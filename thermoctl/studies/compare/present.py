@@ -69,7 +69,7 @@ def print_table(console: Console, lines: Sequence[Line], controllers: Sequence[s
         runs = max(score.runs for line in own for score in line.scores.values())
         of = f"{runs} plants" if runs > 1 else "1 plant"
         print_lines(console, [f"{fleet}: {FLEETS[fleet].text}; {of}"])
-        print_whole(console, table, keys=2)
+        print_whole(console, table)
         print_lines(console, [""])
     text = f"Median / 95 % of the plants; × is times the bound, {MISSED} misses a goal"
     print_lines(console, [f"{text}; the verdict is on {controllers[0]}."])
