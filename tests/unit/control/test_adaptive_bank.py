@@ -389,17 +389,12 @@ def test_with_much_heat_under_way_the_power_is_calmer_up_to_three_times(lag_s, g
     assert moved == pytest.approx(0.1 / (gain * Tc_s) / (1.0 + SMOOTHNESS * Tc_s))
 
 
-def counted(surplus, gain=0.036):
-    """Return as how much power a surplus in the heater counts, at the set point."""
-    near = Outlook(37.5, 0.2, 20.0, gain, heater_k=10.0 * gain)
-    asked = (
-        power_for(near._replace(surplus=each), 37.5, 0.4, 1.0, (-99.0, 99.0), before=0.2) - 0.2
-        for each in (surplus, 0.0)
-    )
+def counted(surplus, gain=0.036, least=0.0):
+    """Return as how much power a surplus in the heater counts, well within the limits."""
+    near = Outlook(37.5, 0.5, 20.0, gain, heater_k=gain)
+    asked = power_for(near._replace(surplus=surplus), 37.5, 0.4, 1.0, (least, 1.0), before=0.5)
     Tc_s = 0.4 * 20.0 * min(max(gain * 20.0 / 1.2, 1.0), 3.0)
-    moved, at_rest = asked
-    assert at_rest == pytest.approx(0.0)
-    return surplus - moved * (1.0 + SMOOTHNESS * Tc_s) * Tc_s / 10.0
+    return surplus - (asked - 0.5) * (1.0 + SMOOTHNESS * Tc_s) * Tc_s
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -412,6 +407,7 @@ def test_heat_in_the_heater_counts_twice_at_rest_and_in_part_on_the_move(sign):
 def test_on_the_move_more_of_it_counts_the_more_is_under_way():
     assert counted(0.8, gain=0.12) == pytest.approx(0.8)
     assert counted(0.8, gain=0.3) == pytest.approx(1.4 * 0.8)
+    assert counted(0.8, gain=0.06, least=-1.0) == pytest.approx(0.8)  # by a cooler as well
 
 
 @pytest.mark.parametrize(("off_k", "bounds", "left_k"), [

@@ -159,7 +159,8 @@ class PlainBank:
         Tc = max(3.0, FASTEST_PERIODS * self.h, self.kappa * heavy * lag)
         tau, before = 0.4 * Tc, self.powers[0]
         aim = coasting + beta * tau * (before - u_ss)
-        moving = 1.0 + 0.4 * (heavy - 2.0)  # share of the heater's heat that counts
+        swing = min(max(beta * lag * (self.u_max - self.u_min) / 1.2, 1.0), 3.0)
+        moving = 1.0 + 0.4 * (swing - 2.0)  # share of the heater's heat that counts
         aim -= heater * surplus
         size = abs(surplus)
         aim += heater * max(moving * size, 2.2 * min(size, 0.08)) * (1 if surplus > 0 else -1)

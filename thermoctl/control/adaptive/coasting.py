@@ -52,8 +52,8 @@ while a power that has far to go is at its limit at once all the same."""
 CARRIED, EVEN = 0.4, 2.0
 """On the move so much of the heat in the heater is left out of account. Were all of it counted, the
 error would go by Tc and the water follow as slowly as the heater; so both go at one pace, damped by
-some .85. A lag that is mistaken then costs more: where Tc is so many times as long all of that heat
-counts, and beyond it even more."""
+some .85. A lag that is mistaken then costs more: where the range of power has so many times
+`HEAVY_K` under way all of that heat counts, and beyond it even more."""
 AT_REST, REST = 2.2, 0.08
 """Within so small a surplus of power that heat counts so many times. At rest it is the answer to
 noise that has passed, and what is taken back of it need not be cooled away."""
@@ -147,21 +147,25 @@ def power_for(
     ramp_power : float
         What lets the water rise with a ramp, beside the holding power.
     """
-    heavy = clamp(outlook.gain * outlook.lag_s / HEAVY_K, 1.0, CALMER)
+    full_k = outlook.gain * outlook.lag_s
+    heavy = clamp(full_k / HEAVY_K, 1.0, CALMER)
     Tc_s = max(FASTEST_S, FASTEST_PERIODS * period_s, calmness * heavy * outlook.lag_s)
     tau_s = SMOOTHNESS * Tc_s
     resting = outlook.holding_power + ramp_power
     aim_c = outlook.coasting_c + outlook.gain * tau_s * (before - resting)
     surplus = outlook.surplus - ramp_power
-    aim_c += outlook.heater_k * (_counted(surplus, heavy) - surplus)
+    aim_c += outlook.heater_k * (_counted(surplus, full_k * (bounds[1] - bounds[0])) - surplus)
     error_k = _agreed(setpoint_c - aim_c, outlook.spread_k, bounds)
     wanted = resting + error_k / (outlook.gain * Tc_s)
     return clamp(before + (wanted - before) * period_s / (period_s + tau_s), *bounds)
 
 
-def _counted(surplus: float, heavy: float) -> float:
-    """Return as how much the heat in the heater counts, for a surplus of power of `surplus`."""
-    moving = 1.0 + CARRIED * (heavy - EVEN)
+def _counted(surplus: float, swing_k: float) -> float:
+    """Return as how much a surplus of power in the heater counts.
+
+    `swing_k` is what the whole range of power has under way within a lag; a cooler adds to it.
+    """
+    moving = 1.0 + CARRIED * (clamp(swing_k / HEAVY_K, 1.0, CALMER) - EVEN)
     size = abs(surplus)
     return math.copysign(max(moving * size, min(AT_REST * size, AT_REST * REST)), surplus)
 
