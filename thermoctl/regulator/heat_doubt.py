@@ -31,6 +31,8 @@ FULL_SHARE = 0.02
 """And so much of full power: loss that wanders."""
 EXTRA_GAINS, EXTRA_SHARE = 2.5, 0.3
 """So many times the gain, and so much of full power besides, is no stuck output."""
+SURE_SHARE = 0.7
+"""What a plant loses at least, of what its cooling says."""
 MEMORY_S, MEMORY_LAGS = 300.0, 10.0
 """Memory of the quiet rates."""
 FOLLOWS_SDS = 4.0
@@ -47,12 +49,10 @@ COMPARED_FROM_S, COMPARED_S = 600.0, 21600.0
 """The loss it had is learnt for the first time, and forgotten over the second."""
 SETTLE_S = 300.0
 """After a jump it is not known what the plant does without power."""
-COOLS_WITHIN_S, COOLS_LEAST_S = 1000.0, 30.0
+COOLS_WITHIN_S = 1000.0
 """Loss grows by a K in so many seconds for every K above where it was learnt: half a litre in a
-draught. What is hotter than ever before may take that much more power before it is a doubt. A plant
-that was seen to cool faster may take more, but no more than by the second."""
-SPREAD_K2 = 4.0
-"""How loss grows with the reading is learnt from readings whose variance is more than this."""
+draught. What is hotter than ever before may take that much more power before it is a doubt; on a
+plant that was seen to cool faster, more."""
 
 
 class Seen(NamedTuple):
@@ -76,10 +76,7 @@ class HeatDoubt:
         self._rates: Heat = (0.0,) * len(LAGS_S)
         self._rise_rate = 0.0
         self._known_s = 0.0
-        self._level_c = math.nan
-        self._spread_k2 = self._rise_along = 0.0
-        self._rates_along: Heat = (0.0,) * len(LAGS_S)
-        self._cools_per_s = 1.0 / COOLS_WITHIN_S
+        self._level_c, self._coldest_c = math.nan, math.inf
         self._stood_c = math.nan
         self._stood_s = self._stood_power = 0.0
         self._settle_s = 0.0
@@ -106,7 +103,12 @@ class HeatDoubt:
 
     def cold(self, gain: Gain, sd_k: float) -> bool:
         """Return whether the reading fails to answer to the power."""
-        return self._missing_k > _limit_k(gain, sd_k, LAGS) or self._crept_s > CREPT_S
+        return self._missing_k > _limit_k(gain, sd_k, LAGS) or self.crept
+
+    @property
+    def crept(self) -> bool:
+        """Whether the loss has grown for long while the reading stood still."""
+        return self._crept_s > CREPT_S
 
     def hot(self, gain: Gain, sd_k: float) -> bool:
         """Return whether the reading rises beyond what any power explains."""
@@ -117,10 +119,11 @@ class HeatDoubt:
     ) -> None:
         """Add what happened from `before` to `now`; quiet rates `follow` if they may."""
         span_s, rise_k = now.t_s - before.t_s, now.reading_c - before.reading_c
-        heat_s = [after - was for after, was in zip(now.heat_s, before.heat_s, strict=True)]
-        heat_k, full_k = gain.mean * heat_s[gain.place], gain.mean * span_s
+        heat_k = gain.mean * (now.heat_s[gain.place] - before.heat_s[gain.place])
+        full_k = gain.mean * span_s
+        self._coldest_c = min(self._coldest_c, now.reading_c)
         loss_k = self.loss(gain) * span_s
-        loss_k += self._unseen(now.reading_c) * span_s
+        loss_k += self._unseen(gain, now.reading_c) * span_s
         missing_k = clamp(heat_k - loss_k - rise_k, -2.0 * full_k, heat_k)
         missing_k += self._missing_k - HALF * heat_k - FULL_SHARE * full_k
         if self._missing_k == 0.0:
@@ -128,51 +131,48 @@ class HeatDoubt:
         self._missing_k = max(0.0, missing_k)
         self._settle_s = SETTLE_S if jumped else self._settle_s - span_s
         if self._settle_s <= 0.0:
-            extra_k = rise_k + min(self.loss(gain) * span_s, 0.0) - EXTRA_GAINS * heat_k
+            extra_k = rise_k + self._sure_loss(gain, now.reading_c) * span_s - EXTRA_GAINS * heat_k
             extra_k = clamp(extra_k, -full_k, full_k) - EXTRA_SHARE * full_k
             self._extra_k = max(0.0, self._extra_k + extra_k)
         if follow and not jumped and self.calm(gain, block.sd_k):
             most_k = full_k + FOLLOWS_SDS * block.sd_k
             self._follow(before, now, clamp(rise_k, -most_k, most_k), gain.lag_s)
-            self._learn_along(gain)
         self._creep(gain, now.reading_c, block)
 
-    def _unseen(self, reading_c: float) -> float:
-        """Return by how much the loss may have grown since it was learnt, in K/s."""
+    def _unseen(self, gain: Gain, reading_c: float) -> float:
+        """Return what a loss may have grown, or has surely shrunk, by since it was learnt."""
         above_k = reading_c - self._level_c
-        return above_k * self._cools_per_s if above_k > 0.0 else 0.0
+        if above_k > 0.0:
+            return above_k * max(gain.cools_per_s, 1.0 / COOLS_WITHIN_S)
+        return above_k * SURE_SHARE * gain.cools_per_s
+
+    def _sure_loss(self, gain: Gain, reading_c: float) -> float:
+        """Return how fast a reading surely falls without power, in K/s.
+
+        A plant that cools faster the hotter it is lost nothing at least where it was coldest.
+        """
+        cools = SURE_SHARE * gain.cools_per_s * (reading_c - self._coldest_c)
+        return min(self.loss(gain), max(cools, 0.0))
 
     def _holding(self, gain: Gain, reading_c: float) -> float:
         """Return the power that makes up for the loss at `reading_c`."""
-        return (self.loss(gain) + self._unseen(reading_c)) / gain.mean
+        return (self.loss(gain) + self._unseen(gain, reading_c)) / gain.mean
 
     def _follow(self, before: Seen, now: Seen, rise_k: float, lag_s: float) -> None:
-        """Let the quiet rates follow those of a block, and how they go with the reading."""
+        """Let the quiet rates follow those of a block."""
         span_s = now.t_s - before.t_s
         self._known_s += span_s
         share = span_s / min(self._known_s, max(MEMORY_S, MEMORY_LAGS * lag_s))
+        self._rates = tuple(
+            [
+                mean + share * ((after - was) / span_s - mean)
+                for mean, after, was in zip(self._rates, now.heat_s, before.heat_s, strict=True)
+            ]
+        )
+        self._rise_rate += share * (rise_k / span_s - self._rise_rate)
         if math.isnan(self._level_c):
             self._level_c = now.reading_c
-        above_k, rise_rate = now.reading_c - self._level_c, rise_k / span_s
-        keep, by_k = 1.0 - share, (1.0 - share) * share * above_k
-        rates, along = [], []
-        for place, mean in enumerate(self._rates):
-            off = (now.heat_s[place] - before.heat_s[place]) / span_s - mean
-            rates.append(mean + share * off)
-            along.append(keep * self._rates_along[place] + by_k * off)
-        self._rates, self._rates_along = tuple(rates), tuple(along)
-        off = rise_rate - self._rise_rate
-        self._rise_rate += share * off
-        self._rise_along = keep * self._rise_along + by_k * off
-        self._level_c += share * above_k
-        self._spread_k2 = keep * self._spread_k2 + by_k * above_k
-
-    def _learn_along(self, gain: Gain) -> None:
-        """Learn how loss grows with the reading, where readings were far enough apart."""
-        if self._spread_k2 > SPREAD_K2:
-            along = gain.mean * self._rates_along[gain.place] - self._rise_along
-            cools_per_s = along / self._spread_k2
-            self._cools_per_s = clamp(cools_per_s, 1.0 / COOLS_WITHIN_S, 1.0 / COOLS_LEAST_S)
+        self._level_c += share * (now.reading_c - self._level_c)
 
     def _creep(self, gain: Gain, reading_c: float, block: Block) -> None:
         """Notice a loss that grows while the reading stands still."""
@@ -191,7 +191,7 @@ class HeatDoubt:
     def told(self, gain: Gain, now: Seen) -> str:
         """Return what was expected since the doubt began, and what came."""
         since, loss = self.since, self.loss(gain)
-        if self._crept_s > CREPT_S:
+        if self.crept:
             return (
                 f"expected about {self._stood_power:.0%} power to hold the reading, "
                 f"it took {self._holding(gain, now.reading_c):.0%}"

@@ -9,6 +9,16 @@ A fading straight line is taken from y and from every H by one and the same filt
 loss first of all, is gone from both, and a regression of what is left through the origin is the
 gain beta. A lag is as good as little remains. It is learnt only while power moves: a controller
 that makes up for a draught makes it look as if heat did nothing.
+
+A small plant cools within those same minutes, and its loss is no straight line. It is as a lag of
+heat shows it, k times the reading, so that the integral of the reading is one regressor more, for
+all lags the same:
+
+.. math:: y = y_0 - d\,t + \beta H_j - k \int y\,dt
+
+Without it a gain of .5 K/s is taken for .3, and half of what holds such a plant seems to be lost.
+It counts only where it is sure: the bend of a lag that lies between two of those that are tried, or
+of a heater that has just died, looks like a loss as well.
 """
 
 from __future__ import annotations
@@ -21,6 +31,8 @@ Heat = tuple[float, ...]
 
 LAGS_S = (4.0, 9.0, 20.0, 45.0, 90.0, 150.0)
 """Total lags from power to reading; each is two equal poles."""
+BETWEEN_S = (6.0, 13.0, 30.0, 64.0)
+"""More of them for the regression: between two lags the gain would be wrong by half."""
 TREND_S = 100.0
 """Memory of the straight line."""
 MEMORY_S = 1500.0
@@ -32,6 +44,10 @@ MEAN_S = 50.0
 ALIKE = 4.0
 """What remains of one block resembles the next, so errors are larger than they look."""
 BLOCKS_LEAST = 4.0
+COOLS_SURE = 3.0
+"""A loss that grows with the reading is one from so many standard deviations on,"""
+COOLS_S, COOLS_MOST = 100.0, 1.0 / 30.0
+"""and is expected to be about one part in so many seconds, if any, and no more than the second."""
 JUMP_K, JUMP_SDS, JUMP_GAINS = 0.5, 10.0, 3.0
 """A reading that moves by more in a block than these is no drift: somebody poured."""
 MIXES_S = 100.0
@@ -61,11 +77,15 @@ class Block(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """Rise at full power in K/s, its sd, and the place of its lag in `LAGS_S`."""
+    """Rise at full power in K/s, its sd, and the place of its lag in `LAGS_S`.
+
+    A reading that is higher by a K falls faster by `cools_per_s` in K/s.
+    """
 
     mean: float
     sd: float
     place: int
+    cools_per_s: float = 0.0
 
     @property
     def lag_s(self) -> float:
@@ -85,6 +105,7 @@ class _Path:
     """
 
     __slots__ = (
+        "along",
         "first",
         "heat_s",
         "line",
@@ -100,25 +121,45 @@ class _Path:
     def __init__(self, lag_s: float) -> None:
         self.pole_s = 0.5 * lag_s
         self.step = 1.0
-        self.squares = self.products = 0.0
+        self.squares = self.products = self.along = 0.0
         self.begin_again()
 
     def begin_again(self) -> None:
         self.first = self.second = self.heat_s = self.line = self.slope = self.off = 0.0
 
     def arrive(self, span_s: float, power: float) -> None:
-        self.first += self.step * (power - self.first)
-        self.second += self.step * (self.first - self.second)
-        self.heat_s += span_s * self.second
-        self.line += span_s * self.slope
-        self.off = self.heat_s - self.line
+        step = self.step
+        self.first = first = self.first + step * (power - self.first)
+        self.second = second = self.second + step * (first - self.second)
+        self.heat_s = heat_s = self.heat_s + span_s * second
+        self.line = line = self.line + span_s * self.slope
+        self.off = heat_s - line
 
     def stand(self) -> None:
         self.line, self.off = self.heat_s, 0.0
 
+    def learn(self, keep: float, rest_k: float, total_ks: float) -> None:
+        off = self.off
+        self.squares = keep * self.squares + off * off
+        self.products = keep * self.products + off * rest_k
+        self.along = keep * self.along + off * total_ks
+
+
+class _Total:
+    """The integral of the reading, less its own fading line, and what it has in common with it."""
+
+    __slots__ = ("off", "products", "slope_c", "squares")
+
+    def __init__(self) -> None:
+        self.squares = self.products = 0.0
+        self.begin_again(0.0)
+
+    def begin_again(self, reading_c: float) -> None:
+        self.off, self.slope_c = 0.0, reading_c
+
     def follow(self, by: float, by_per_s: float) -> None:
-        self.line += by * self.off
-        self.slope += by_per_s * self.off
+        self.slope_c += by_per_s * self.off
+        self.off -= by * self.off
 
     def learn(self, keep: float, rest_k: float) -> None:
         self.squares = keep * self.squares + self.off * self.off
@@ -139,11 +180,12 @@ class HeatResponse:
     """
 
     def __init__(self) -> None:
-        self._paths = [_Path(lag_s) for lag_s in LAGS_S]
+        self._paths = [_Path(lag_s) for lag_s in LAGS_S + BETWEEN_S]
+        self._total = _Total()
         self._span_s = math.nan
         self._fade = 1.0
         self._mean_power, self._moving_s = 0.0, 0.0
-        self._squares = self._blocks = 0.0
+        self._squares = self._blocks = self._variance = 0.0
         self.gain: Gain | None = None
         self.begin_again()
 
@@ -151,30 +193,32 @@ class HeatResponse:
         """Forget where heat and reading are; what was learnt of the plant stays."""
         for path in self._paths:
             path.begin_again()
-        self.heat_s: Heat = (0.0,) * len(self._paths)
+        self.heat_s: Heat = (0.0,) * len(LAGS_S)
         self._line_c = self._slope = self._mixes_s = 0.0
         self._last_c = math.nan
         self.jumped = False
 
     def observe(self, block: Block, *, learn: bool) -> None:
         """Take one more block in, and learn from it if that is wanted."""
-        span_s, reading_c, paths = block.span_s, block.reading_c, self._paths
+        span_s, reading_c, paths, total = block.span_s, block.reading_c, self._paths, self._total
         self._arrive(span_s, block.power)
         self._mixes_s -= span_s
         self.jumped = False
         if math.isnan(self._last_c):
             self._line_c = self._last_c = reading_c
+            total.begin_again(reading_c)
             for path in paths:
                 path.line = path.heat_s
             return
         self._line_c += span_s * self._slope
         if math.isnan(reading_c):
             return
+        total.off += span_s * (0.5 * (reading_c + self._last_c) - total.slope_c)
         moved_k, self._last_c = reading_c - self._last_c, reading_c
         if abs(moved_k) > self._most_k(block):
             self.jumped, self._mixes_s = True, MIXES_S
         if self._mixes_s > 0.0:
-            self._line_c = reading_c
+            self._line_c, total.off = reading_c, 0.0
             for path in paths:
                 path.stand()
             return
@@ -182,10 +226,12 @@ class HeatResponse:
         by, by_per_s = 1.0 - fade * fade, (1.0 - fade) ** 2 / span_s
         self._line_c += by * rest_k
         self._slope += by_per_s * rest_k
-        for path in paths:
-            path.follow(by, by_per_s)
         if learn and self._moving_s > 0.0:
             self._learn(rest_k, block)
+        total.follow(by, by_per_s)
+        for path in paths:  # no method: a call for every lag would cost more than this
+            path.line += by * path.off
+            path.slope += by_per_s * path.off
 
     def _arrive(self, span_s: float, power: float) -> None:
         """Let `span_s` of `power` go through every lag."""
@@ -195,7 +241,7 @@ class HeatResponse:
                 path.step = -math.expm1(-span_s / path.pole_s)
         for path in self._paths:
             path.arrive(span_s, power)
-        self.heat_s = tuple([path.heat_s for path in self._paths])
+        self.heat_s = tuple([path.heat_s for path in self._paths[: len(LAGS_S)]])
         away = power - self._mean_power
         self._mean_power += min(span_s / MEAN_S, 1.0) * away
         self._moving_s = TREND_S if abs(away) > MOVES else self._moving_s - span_s
@@ -207,17 +253,49 @@ class HeatResponse:
 
     def _learn(self, rest_k: float, block: Block) -> None:
         """Add what is left of a block to the regression."""
-        keep = math.exp(-block.span_s / MEMORY_S)
+        keep, total = math.exp(-block.span_s / MEMORY_S), self._total
         for path in self._paths:
-            path.learn(keep, rest_k)
+            path.learn(keep, rest_k, total.off)
+        total.learn(keep, rest_k)
         self._squares = keep * self._squares + rest_k * rest_k
         self._blocks = keep * self._blocks + 1.0
-        explained = [p.products * p.products / p.squares if p.squares else 0.0 for p in self._paths]
-        most = max(explained)
-        place = explained.index(most)
-        best = self._paths[place]
-        if self._blocks < BLOCKS_LEAST or not best.squares:
-            return
-        variance = max((self._squares - most) / self._blocks, block.sd_k**2)
+        if self._blocks >= BLOCKS_LEAST and self._paths[0].squares:
+            self.gain = self._fit(block)
+
+    def _fit(self, block: Block) -> Gain:
+        """Return the gain under the lag that explains most; of a plant that cools, if that is sure.
+
+        How fast it cools is a ridge regression: about nothing, unless the readings know better.
+        """
+        paths, total, least = self._paths, self._total, block.sd_k**2
+        own = total.squares + (ALIKE * COOLS_S) ** 2 * max(self._variance, least)
+        products, plain, cooling = total.products, [], []
+        for path in paths:
+            squares, along = path.squares, path.along
+            alone = path.products * path.products / squares
+            rest = along * path.products - squares * products
+            plain.append(alone)
+            if rest > 0.0:
+                alone += rest * rest / (squares * (squares * own - along * along))
+            cooling.append(alone)
+        most = max(cooling)
+        best = paths[cooling.index(most)]
+        self._variance = variance = max((self._squares - most) / self._blocks, least)
+        across = best.squares * own - best.along * best.along
+        cools_per_s = (best.along * best.products - best.squares * products) / across
+        if cools_per_s > COOLS_SURE * ALIKE * math.sqrt(variance * best.squares / across):
+            cools_per_s = min(cools_per_s, COOLS_MOST)
+            mean = (best.products + cools_per_s * best.along) / best.squares
+            sd = ALIKE * math.sqrt(variance * own / across)
+            return Gain(mean, sd, _place(cooling), cools_per_s)
+        most = max(plain)
+        best = paths[plain.index(most)]
+        variance = max((self._squares - most) / self._blocks, least)
         sd = ALIKE * math.sqrt(variance / best.squares)
-        self.gain = Gain(best.products / best.squares, sd, place)
+        return Gain(best.products / best.squares, sd, _place(plain))
+
+
+def _place(explained: list[float]) -> int:
+    """Return the place in `LAGS_S` that explains the most."""
+    known = explained[: len(LAGS_S)]
+    return known.index(max(known))

@@ -35,6 +35,8 @@ RISES = 0.3
 """A reading that rises by so much of what full power does, without any, is heated all the same."""
 BEFORE_LAGS, BEFORE_S = 1.5, 16.0
 """What was before the cut is looked at for so long."""
+CREPT_LAGS = 4.5
+"""So long where the reading has stood still: there is nothing to compare, were it shorter."""
 HEARD_S, HEARD_LAGS = 20.0, 0.5
 """A good answer is believed from then on, of a heater that is not known, and of one that is;"""
 BAD_S, BAD_LAGS = 60.0, 2.0
@@ -245,7 +247,8 @@ class HeaterWatch:
             rate = heat_question.slope(rows, self._t_s - OFF_LAGS * known.lag_s)
             self._fail("heater.stuck_on", _rises(rate), t_s)
         elif hot or (doubt.cold(known, sd_k) and block.power >= OFF):
-            from_s = self._t_s - max(BEFORE_LAGS * known.lag_s, BEFORE_S)
+            lags = CREPT_LAGS if doubt.crept else BEFORE_LAGS
+            from_s = self._t_s - max(lags * known.lag_s, BEFORE_S)
             since_s = from_s if doubt.since is None else min(doubt.since.t_s, from_s)
             wild = self._wild(known, since_s, WILD) or self._wild(known, from_s, WILD)
             self._ask(now, from_s, doubt.told(known, now), wild=wild)
@@ -343,7 +346,8 @@ class HeaterWatch:
         self._emit("heater.answered", text=text)
         known = self._known
         if known is None or shown.mean < CHANGED * known.mean:
-            self._known = known = shown
+            cools_per_s = 0.0 if known is None else known.cools_per_s
+            self._known = known = shown._replace(cools_per_s=cools_per_s)
         elif shown.mean > known.mean / CHANGED:
             self._known = known = known._replace(mean=min(shown.mean, AT_ONCE * known.mean))
         self._doubt.trust(known)

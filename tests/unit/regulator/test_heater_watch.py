@@ -240,6 +240,42 @@ def test_gain_and_lag_are_learnt_from_powers_that_move_whatever_drifts():
     assert abs(gain.mean - 0.02) < 3.0 * gain.sd < 0.004
 
 
+def quick(n, beta, cools_per_s, lag_s, seed=1):
+    """Return what `n` blocks of a plant teach that cools within minutes, held by proportion."""
+    rng, response = np.random.default_rng(seed), HeatResponse()
+    first = second = power = above_k = 0.0
+    for _ in range(n):
+        for _ in range(8):
+            first += -math.expm1(-1.0 / lag_s) * (power - first)
+            second += -math.expm1(-1.0 / lag_s) * (first - second)
+            above_k += 0.5 * (beta * second - cools_per_s * above_k)
+        shown = 23.0 + above_k + 0.03 * rng.standard_normal()
+        response.observe(Block(4.0, power, shown, 0.03), learn=True)
+        power = min(max(0.5 + 0.1 * (50.0 - shown), 0.0), 1.0)
+    return response.gain
+
+
+@pytest.mark.parametrize("lag_s", [4.0, 10.0, 13.0, 20.0])
+@pytest.mark.parametrize("cools_per_s", [1 / 80, 1 / 110, 1 / 150])
+def test_the_gain_of_a_plant_that_cools_within_minutes_is_that_of_its_heater(lag_s, cools_per_s):
+    gain = quick(50, 0.5, cools_per_s, lag_s)
+    assert abs(gain.mean / 0.5 - 1.0) < 0.15
+    assert abs(gain.cools_per_s / cools_per_s - 1.0) < 0.35
+
+
+def test_a_heater_that_dies_is_not_taken_for_a_plant_that_cools():
+    rng, response = np.random.default_rng(2), HeatResponse()
+    first = second = 0.0
+    y = 25.0
+    for n in range(60):
+        first += -math.expm1(-4.0 / 13.0) * ((n < 40) - first)
+        second += -math.expm1(-4.0 / 13.0) * (first - second)
+        y += 4.0 * 0.04 * second
+        response.observe(Block(4.0, 1.0, y + 0.01 * rng.standard_normal(), 0.01), learn=n < 44)
+    assert response.gain.cools_per_s < 1e-3
+    assert abs(response.gain.mean / 0.04 - 1.0) < 0.15
+
+
 @pytest.mark.parametrize(("dip_k", "mixes_s", "falls_s"), [(1.5, 10.0, 3.0), (1.0, 20.0, 4.0)])
 def test_water_that_mixes_under_full_power_is_no_gain(dip_k, mixes_s, falls_s):
     rng, response = np.random.default_rng(1), HeatResponse()
