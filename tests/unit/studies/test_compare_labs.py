@@ -201,10 +201,10 @@ def test_a_lab_is_given_the_limits_and_the_gain_of_its_data_sheet():
     assert rig.limits.trip_above_c == TABLE.trip_above_c
 
 
-def test_the_heater_of_a_lab_is_not_asked_and_that_of_a_rig_is():
+def test_the_heater_of_a_lab_is_checked_as_that_of_a_rig():
     law = contender("on-off", TABLE)
-    assert law.plan_for(plant("tclab", 3)).heater_check is None
-    assert law.plan_for(plant("rig", 3)).heater_check is not None
+    checks = [law.plan_for(plant(fleet, 3)).heater_check for fleet in ("tclab", "rig")]
+    assert checks[0] == checks[1] is not None
 
 
 def test_a_lab_has_settled_within_its_own_band_in_runs_and_in_bounds():

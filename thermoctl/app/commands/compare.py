@@ -128,9 +128,7 @@ def _plan(table: LoopTable, where: Plant, *, nameplate: bool, fitted: bool) -> P
 
 def _fitted(table: LoopTable, usage: Usage) -> LoopTable:
     """Return the loop as `usage` has it; what that leaves open is as it was."""
-    check = table.heater_check
     own = {
-        "heater_check": check.model_copy(update={"enabled": check.enabled and usage.heater_check}),
         "setpoint_c": usage.held_c,
         "setpoint_max_c": usage.setpoint_max_c,
         "trip_above_c": usage.trip_above_c,

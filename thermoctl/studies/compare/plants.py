@@ -61,9 +61,6 @@ class Usage:
         Highest set point, and the trip; None: as the configuration has them.
     gain_k_per_s, heater_w : float or None
         Rise at full power, and that power; None: as the configuration has them.
-    heater_check : bool
-        False: the heater is not asked. One whose loss is as quick as a lab's is asked again and
-        again, since what it gives goes to the room, and every question cuts the power.
     """
 
     held_c: float = HELD_C
@@ -71,7 +68,6 @@ class Usage:
     trip_above_c: float | None = None
     gain_k_per_s: float | None = None
     heater_w: float | None = None
-    heater_check: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +225,6 @@ FLEETS: Mapping[str, Fleet] = {
             trip_above_c=80.0,
             gain_k_per_s=0.5,
             heater_w=1.0,
-            heater_check=False,
         ),
         ordered=LAB,
         band_k=LAB_BAND_K,
