@@ -21,6 +21,9 @@ from thermoctl.regulator.heat_response import LAGS_S, Block, Gain, Heat
 
 LEAST_K, SDS, LAGS = 0.3, 5.0, 1.0
 """A sum is a doubt beyond these: in K, in standard deviations of a reading, in rises of a lag."""
+LAGS_AGAIN = 0.4
+"""After a bad answer a second question is put sooner: to a heater that was mended it is harmless,
+and all this time another one heats what nobody sees."""
 EXTRA_LAGS = 0.6
 CALM, CALM_SDS = 0.1, 2.0
 """Below this share of its limit, or so many standard deviations of a reading, a sum is nothing, and
@@ -101,9 +104,10 @@ class HeatDoubt:
         nothing_k = max(CALM * _limit_k(gain, sd_k, LAGS), CALM_SDS * sd_k)
         return max(self._missing_k, self._extra_k) < nothing_k
 
-    def cold(self, gain: Gain, sd_k: float) -> bool:
-        """Return whether the reading fails to answer to the power."""
-        return self._missing_k > _limit_k(gain, sd_k, LAGS) or self.crept
+    def cold(self, gain: Gain, sd_k: float, *, again: bool = False) -> bool:
+        """Return whether the reading fails to answer to the power; sooner once it has failed to."""
+        limit_k = _limit_k(gain, sd_k, LAGS_AGAIN if again else LAGS)
+        return self._missing_k > limit_k or self.crept
 
     @property
     def crept(self) -> bool:

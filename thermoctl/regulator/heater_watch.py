@@ -237,8 +237,9 @@ class HeaterWatch:
     def _compare(self, known: Gain, block: Block, before: Seen, now: Seen, t_s: float) -> None:
         """Compare what a known heater should have done with what came."""
         doubt, sd_k, jumped = self._doubt, block.sd_k, self._response.jumped
-        doubt.compare(known, block, before, now, jumped=jumped, follow=self._distrusted_k <= 0.0)
-        if self._distrusted_k > 0.0 and doubt.calm(known, sd_k):
+        again = self._distrusted_k > 0.0
+        doubt.compare(known, block, before, now, jumped=jumped, follow=not again)
+        if again and doubt.calm(known, sd_k):
             place = known.place
             self._distrusted_k -= known.mean * (now.heat_s[place] - before.heat_s[place])
         hot = doubt.hot(known, sd_k)
@@ -246,7 +247,7 @@ class HeaterWatch:
             rows = self._rows
             rate = heat_question.slope(rows, self._t_s - OFF_LAGS * known.lag_s)
             self._fail("heater.stuck_on", _rises(rate), t_s)
-        elif hot or (doubt.cold(known, sd_k) and block.power >= OFF):
+        elif hot or (doubt.cold(known, sd_k, again=again) and block.power >= OFF):
             lags = CREPT_LAGS if doubt.crept else BEFORE_LAGS
             from_s = self._t_s - max(lags * known.lag_s, BEFORE_S)
             since_s = from_s if doubt.since is None else min(doubt.since.t_s, from_s)
