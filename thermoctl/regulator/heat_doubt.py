@@ -105,7 +105,7 @@ class HeatDoubt:
         return max(self._missing_k, self._extra_k) < nothing_k
 
     def cold(self, gain: Gain, sd_k: float, *, again: bool = False) -> bool:
-        """Return whether the reading fails to answer to the power; sooner once it has failed to."""
+        """Return whether the reading fails to answer; sooner `again`, after a bad answer."""
         limit_k = _limit_k(gain, sd_k, LAGS_AGAIN if again else LAGS)
         return self._missing_k > limit_k or self.crept
 
