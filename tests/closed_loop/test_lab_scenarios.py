@@ -31,10 +31,10 @@ class Row:
 
 
 ROWS = {
-    "warm-up": Row({"overshoot_k": 0.15}, {"settled_s": 2.5}),
+    "warm-up": Row({"overshoot_k": 0.15}, {"settled_s": 3.6}),
     "regulation": Row({"largest_k": 0.15, "travel_per_min": 0.7}, {"deviation_k": 2.3}),
-    "step": Row({"overshoot_k": 0.15, "settled_s": 120.0}, {}),
-    "second-heater": Row({"largest_k": 0.25, "settled_s": 250.0}, {}),
+    "step": Row({"overshoot_k": 0.15, "settled_s": 210.0}, {}),
+    "second-heater": Row({"largest_k": 0.27, "settled_s": 320.0}, {}),
 }
 
 

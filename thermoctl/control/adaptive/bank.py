@@ -22,6 +22,10 @@ from thermoctl.control.adaptive.evidence import (
     GATE,
     GATE_SAMPLES,
     HOLD_LAGS,
+    QUIET_LAGS,
+    QUIET_POWER,
+    QUIET_SAMPLES,
+    Drifting,
     Excitation,
     Gate,
     Noise,
@@ -55,6 +59,8 @@ class BankBelief:
         What the readings were like.
     weights : Weights
         How likely each hypothesis is.
+    drifting : Drifting
+        Whether the water drifts by itself.
     heard : float
         What the last sample counted as evidence for or against them, in [0, 1].
     block : ndarray, shape (4, 5, n) or None
@@ -72,6 +78,7 @@ class BankBelief:
     noise: Noise
     gate: Gate
     weights: Weights
+    drifting: Drifting
     heard: float = 0.0
     block: filters.Block | None = None
     outlook: Outlook | None = None
@@ -84,6 +91,7 @@ class Met(NamedTuple):
     noise: Noise
     gate: Gate
     weights: Weights
+    drifting: Drifting
     heard: float
     block: filters.Block
 
@@ -139,6 +147,7 @@ class Bank:
             Noise(),
             Gate(),
             evidence.equal(self.hypotheses),
+            Drifting(),
         )
 
     def observe(self, belief: BankBelief, y_c: float, applied: float) -> BankBelief:
@@ -166,12 +175,12 @@ class Bank:
         if belief.block is None and not seen:
             return replace(belief, path=way, excitation=excitation)
         sample, blind = belief.sample + 1, 0 if seen else belief.blind + 1
-        block = self._begun(belief, y_c)
+        block, unrest = self._begun(belief, y_c), _unrest(belief.outlook, power)
         if blind * self.period_s <= BLIND_S:
-            block = self._ahead(block, way, sample, _unrest(belief.outlook, power))
-        met = Met(belief.noise, belief.gate, belief.weights, 0.0, block)
+            block = self._ahead(block, way, sample, unrest)
+        met = Met(belief.noise, belief.gate, belief.weights, belief.drifting, 0.0, block)
         if seen:
-            met = self._met(met, y_c, sample, excitation.share)
+            met = self._met(met, y_c, sample, excitation.share, unrest)
         ahead = outlook(met.block, way, met.weights.share, hypotheses, bounds)
         if not math.isfinite(np.vdot(met.block, met.block) + ahead.coasting_c):
             raise ArithmeticError(f"expected a finite belief after {y_c!r} degC at {applied!r}")
@@ -207,30 +216,41 @@ class Bank:
             filters.loosened(block, way.heat, arrived)
         return block
 
-    def _met(self, before: Met, y_c: float, sample: int, share: float) -> Met:
+    def _met(self, before: Met, y_c: float, sample: int, share: float, unrest: float) -> Met:
         """Return what becomes of the prediction when the reading `y_c` meets it."""
-        noise, gate, weights, heard, block = before
+        noise, gate, weights, drifting, heard, block = before
         noise = noise.after(y_c)
         R, m = noise.believed, weights.likeliest
         nu, S_m = y_c - float(block[Z, X, m]), float(block[Z, Z, m]) + R
+        lag = float(self.hypotheses.lag_s[m]) / self.period_s
         if before.noise.samples >= GATE_SAMPLES and nu * nu > GATE * S_m:
-            hold = HOLD_LAGS * float(self.hypotheses.lag_s[m]) / self.period_s
-            gate = gate.beyond(sample, hold)
+            gate = gate.beyond(sample, HOLD_LAGS * lag)
         else:
             gate = gate.within()
         if gate.outlier:
-            return Met(noise, gate, weights, heard, block)
+            return Met(noise, gate, weights, drifting, heard, block)
+        if sample >= drifting.silent_until:
+            still, rest = (
+                share == 0.0 and unrest < QUIET_POWER,
+                max(QUIET_LAGS * lag, QUIET_SAMPLES),
+            )
+            drifting = drifting.after(still, nu / math.sqrt(S_m), rest)
         if gate.jumped:
             block = filters.inflated(block, nu, R)
+            drifting = Drifting(silent_until=gate.silent_until, disturbed=True)
+        elif drifting.found:
+            filters.reopened(block)
+            drifting = Drifting(silent_until=sample + HOLD_LAGS * lag, disturbed=True)
         block, nus, S = filters.corrected(block, y_c, R, share)
         filters.project(
             block, self.hypotheses, self.u_min, loss=sample * self.period_s > LOSS_FROM_S
         )
-        if share > 0.0 and sample >= max(EVIDENCE_FROM, gate.silent_until):
+        silent_until = max(EVIDENCE_FROM, gate.silent_until, drifting.silent_until)
+        if share > 0.0 and sample >= silent_until and not drifting.suspected:
             weights, heard = weights.after(share, nus, S), share
         elif sample < gate.silent_until and not gate.jumped:
             weights = weights.among_shapes(nus, S)
-        return Met(noise, gate, weights, heard, block)
+        return Met(noise, gate, weights, drifting, heard, block)
 
 
 def _arrivals(hypotheses: Hypotheses) -> Mapping[int, Array]:

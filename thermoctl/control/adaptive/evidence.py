@@ -124,6 +124,74 @@ class Gate(NamedTuple):
         return Gate(outside, sample + hold if outside > OUTLIERS else self.silent_until)
 
 
+# -- drifts ---------------------------------------------------------------------------------------
+
+QUIET_LAGS, QUIET_SAMPLES = 3.0, 20
+"""After so many lags of steady power, and so many samples, nothing is under way any more,"""
+QUIET_POWER = 0.15
+"""if the power is this close to what holds the water: a warm-up is steady too, and no rest."""
+DRIFTS = 0.5
+"""The sums are made to find innovations that are off by twice this, in standard deviations."""
+SUSPECTED, DRIFTED = 3.0, 14.0
+"""Of white innovations a sum is beyond the first for 5 % of the time, beyond the second never."""
+
+
+class Drifting(NamedTuple):
+    """Whether the water drifts by itself: a loss that is not what it was.
+
+    A controller answers to a drift with power, and power that follows the reading looks like a slow
+    plant: of all hypotheses the longest lags would win. So two sums are kept as in a CUSUM test,
+    of what innovations have in excess. They run where power has been steady, which is when only a
+    loss can have changed, and from a disturbance on until it is so again.
+
+    Parameters
+    ----------
+    calm : int
+        Samples since power moved.
+    above, below : float
+        The sums, in standard deviations.
+    silent_until : float
+        The sample before which a disturbance is being learnt, and power proves nothing.
+    disturbed : bool
+        Whether power has not been steady since the last one.
+    """
+
+    calm: int = 0
+    above: float = 0.0
+    below: float = 0.0
+    silent_until: float = -math.inf
+    disturbed: bool = False
+
+    def after(self, still: bool, nu: float, rest: float) -> Drifting:
+        """Return the sums after one more innovation.
+
+        Parameters
+        ----------
+        still : bool
+            Whether the power is steady, and about what holds the water.
+        nu : float
+            The innovation over its standard deviation.
+        rest : float
+            Samples of it after which the water is at rest.
+        """
+        calm = self.calm + 1 if still or self.suspected else 0
+        disturbed = self.disturbed and calm < rest
+        if calm < rest and not disturbed:
+            return Drifting(calm, silent_until=self.silent_until)
+        above, below = max(self.above + nu - DRIFTS, 0.0), max(self.below - nu - DRIFTS, 0.0)
+        return Drifting(calm, above, below, self.silent_until, disturbed)
+
+    @property
+    def suspected(self) -> bool:
+        """Whether power that moves now may well answer to a drift, and so proves nothing."""
+        return max(self.above, self.below) > SUSPECTED
+
+    @property
+    def found(self) -> bool:
+        """Whether the water drifts."""
+        return max(self.above, self.below) > DRIFTED
+
+
 # -- weights --------------------------------------------------------------------------------------
 
 SURPRISE_MAX = 9.0

@@ -40,6 +40,8 @@ its way to another temperature, glass and air behind it, loses what it did not l
 LOSS_LAGS, LOSS_SHARE = 2.0, 0.08
 """After so many lags the heat has arrived, and the gain is known well enough to say how large a
 loss may be: this share of it is the standard deviation that `loosened` adds."""
+REOPENED = 0.05
+"""A loss that has changed has done so by something like this share of the gain."""
 DRIFT_Z_K = 0.003
 """Noise of z in a second."""
 DRIFT_GAIN_MIN = 1e-4
@@ -159,6 +161,12 @@ def loosened(block: Block, heat: Array, due: Array) -> None:
     """
     spread = LOSS_SHARE * due * heat * block[BETA, X]
     block[D:, D:X] += spread * spread
+
+
+def reopened(block: Block) -> None:
+    """Make the loss uncertain, in place: the water drifts, so it is not what it was."""
+    spread = REOPENED * block[BETA, X]
+    block[D, D] += spread * spread
 
 
 def _move(rows: Block, heat: Array, hypotheses: Hypotheses) -> None:
