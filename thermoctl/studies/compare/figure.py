@@ -20,7 +20,8 @@ _ROW_IN, _MARGIN_IN, _GAP_IN = 0.30, 0.62, 0.62
 _NAME_IN = 0.14
 _LEFT, _BESIDE = 0.02, 0.17
 _GOAL: Any = {"color": house.MUTE, "linewidth": 0.8, "dashes": (1, 1)}
-_RATIOS, _KELVIN, _TRAVEL = "times the bound", "K", "full ranges a minute"
+_RATIOS, _KELVIN, _SECONDS, _TRAVEL = "times the bound", "K", "s", "full ranges a minute"
+_UNITS = {"settled_s": _SECONDS, "travel_per_min": _TRAVEL}
 
 
 def draw_comparison(
@@ -70,12 +71,10 @@ def draw_comparison(
 
 def _panels(lines: Sequence[Line]) -> list[tuple[str, list[Line]]]:
     """Return the lines of each panel under its unit; only panels that have lines."""
-    sorted_by: dict[str, list[Line]] = {_RATIOS: [], _KELVIN: [], _TRAVEL: []}
+    sorted_by: dict[str, list[Line]] = {_RATIOS: [], _KELVIN: [], _SECONDS: [], _TRAVEL: []}
     for line in lines:
-        if line.in_bounds:
-            sorted_by[_RATIOS].append(line)
-        else:
-            sorted_by[_TRAVEL if line.measure == "travel_per_min" else _KELVIN].append(line)
+        unit = _RATIOS if line.in_bounds else _UNITS.get(line.measure, _KELVIN)
+        sorted_by[unit].append(line)
     return [(unit, own) for unit, own in sorted_by.items() if own]
 
 
