@@ -51,7 +51,7 @@ def told(fault: int, name: str, seconds: float) -> None:
 class Tank:
     """The aquarium at its set point, with its loop; a second is a cycle."""
 
-    def __init__(self, settled_s: int = 120, **keys: object) -> None:
+    def __init__(self, settled_s: int = 300, **keys: object) -> None:
         settings = load(CONFIG / "aquarium.toml")
         board = settings.boards["daq"].model_copy(update={"initial_c": 37.5})
         table = settings.loops["tank"].model_copy(update=keys)
@@ -192,7 +192,7 @@ class Line:
 class Rig:
     """A loop on a thermodaq board at its set point."""
 
-    def __init__(self, settled_s: int = 100) -> None:
+    def __init__(self, settled_s: int = 300) -> None:
         self.clock = ManualClock()
         self.line = Line(self.clock)
         self.link: FaultyLink

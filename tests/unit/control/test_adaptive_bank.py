@@ -475,3 +475,27 @@ def test_hypotheses_cover_three_seconds_to_two_and_a_half_minutes_in_three_shape
     assert (h.element[0::3] < h.element[1::3]).all()
     assert (h.sensor_step[2::3] < h.sensor_step[0::3]).all()  # the slowest sensor is the third
     assert D == 2
+
+
+def test_a_gain_that_is_hardly_known_is_taken_to_be_larger():
+    near = Outlook(coasting_c=37.4, holding_power=0.2, lag_s=20.0, gain=0.036)
+    known = power_for(near, 37.5, 0.35, 1.0, (0.0, 1.0), 0.2)
+    sure = power_for(near._replace(gain_sd=0.2 * 0.036), 37.5, 0.35, 1.0, (0.0, 1.0), 0.2)
+    vague = power_for(near._replace(gain_sd=1.25 * 0.036), 37.5, 0.35, 1.0, (0.0, 1.0), 0.2)
+    assert sure == known
+    assert vague - 0.2 == pytest.approx((known - 0.2) / 2.0)
+
+
+def test_a_start_a_tenth_of_a_kelvin_below_the_set_point_does_not_pass_it_by_as_much():
+    bank, power, most_c, heat = Bank(), 0.0, 0.0, 0.0
+    belief, water_c, sensor_c = bank.start(), 37.4, 37.4
+    rng = np.random.default_rng(2)
+    for _ in range(600):
+        heat += (1 - math.exp(-1 / 14)) * (power - heat)
+        water_c += 0.036 * heat - 0.009
+        sensor_c += (1 - math.exp(-1 / 6)) * (water_c - sensor_c)
+        belief = bank.observe(belief, sensor_c + 0.01 * rng.standard_normal(), power)
+        power = power_for(belief.outlook, 37.5, 0.35, 1.0, bank.bounds, power)
+        most_c = max(most_c, water_c)
+    assert most_c < 37.6
+    assert abs(water_c - 37.5) < 0.05

@@ -76,7 +76,8 @@ class Filter:
         u_ss = min(max(d / beta, u_min), u_max)
         under_way = sum(powers[i] - u_ss for i in range(self.nd))
         coasting = T + beta * (self.t1_s * (self.q - u_ss) + self.h * under_way)
-        return u_ss, coasting, self.lag_s, beta, beta * self.t1_s, self.q - u_ss
+        heater = beta * self.t1_s
+        return u_ss, coasting, self.lag_s, beta, heater, self.q - u_ss, self.P[3, 3]
 
 
 class PlainBank:
@@ -176,7 +177,8 @@ class PlainBank:
         w = np.exp([each.ln_w for each in self.filters])
         rows = [each.coasting(self.powers, self.u_min, self.u_max) for each in self.filters]
         rows = np.array(rows)
-        u_ss, coasting, lag, beta, heater, surplus = self.told = w @ rows / w.sum()
+        *self.told, variance = w @ rows / w.sum()
+        u_ss, coasting, lag, beta, heater, surplus = self.told
         spread = math.sqrt(w @ (rows[:, 1] - coasting) ** 2 / w.sum())
         heavy = min(max(beta * lag / 1.2, 1.0), 3.0)
         Tc = max(3.0, FASTEST_PERIODS * self.h, self.kappa * heavy * lag)
@@ -192,7 +194,8 @@ class PlainBank:
             error = max(error - doubt, 0.0)
         elif self.u_min < 0:
             error = min(error + doubt, 0.0)
-        wanted = u_ss + error / (beta * Tc)
+        doubted = beta + max(math.sqrt(variance) - 0.25 * beta, 0.0)
+        wanted = u_ss + error / (doubted * Tc)
         u = before + (wanted - before) * self.h / (self.h + tau)
         return min(max(u, self.u_min), self.u_max)
 

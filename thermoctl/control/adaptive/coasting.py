@@ -57,6 +57,9 @@ some .85. A lag that is mistaken then costs more: where the range of power has s
 AT_REST, REST = 2.2, 0.08
 """Within so small a surplus of power that heat counts so many times. At rest it is the answer to
 noise that has passed, and what is taken back of it need not be cooled away."""
+VAGUE = 0.25
+"""A gain is taken to be larger by what its deviation exceeds this share of it. Else a start in
+water that is nearly warm would ask for all the power there is, and learn by passing by."""
 CAUTION, AGREED_K = 1.0, 0.05
 """An error is acted on but for so many standard deviations among the hypotheses beyond the latter.
 What they disagree in is heat on its way. When it has arrived they agree: nothing waits for ever."""
@@ -81,6 +84,8 @@ class Outlook(NamedTuple):
         Power that reaches the water, less the holding power.
     spread_k : float
         Standard deviation of `coasting_c` among the hypotheses.
+    gain_sd : float
+        Standard deviation of the gain, as each of them has it.
     """
 
     coasting_c: float
@@ -90,6 +95,7 @@ class Outlook(NamedTuple):
     heater_k: float = 0.0
     surplus: float = 0.0
     spread_k: float = 0.0
+    gain_sd: float = 0.0
 
 
 def outlook(
@@ -98,8 +104,8 @@ def outlook(
     """Return the weighted means; `bounds` are the least and the most power."""
     x = block[:, X]
     beta = x[BETA]
-    means = np.empty((7, len(share)))
-    coasting, holding, _, _, heater, surplus, squares = means
+    means = np.empty((8, len(share)))
+    coasting, holding, _, _, heater, surplus, squares, _ = means
     np.divide(x[D], beta, out=holding)
     np.maximum(holding, bounds[0], out=holding)
     np.minimum(holding, bounds[1], out=holding)
@@ -113,10 +119,12 @@ def outlook(
     means[3] = beta
     np.multiply(hypotheses.element, beta, out=heater)
     np.multiply(coasting, coasting, out=squares)
-    coasting_c, holding_power, lag_s, gain, heater_k, away, square = means.dot(share).tolist()
+    means[7] = block[BETA, BETA]
+    coasting_c, *others, square, variance = means.dot(share).tolist()
+    holding_power, lag_s, gain, heater_k, away = others
     spread_k = math.sqrt(max(square - coasting_c * coasting_c, 0.0))
-    rate = gain / hypotheses.period_s
-    return Outlook(coasting_c, holding_power, lag_s, rate, heater_k, away, spread_k)
+    rate, rate_sd = gain / hypotheses.period_s, math.sqrt(variance) / hypotheses.period_s
+    return Outlook(coasting_c, holding_power, lag_s, rate, heater_k, away, spread_k, rate_sd)
 
 
 def power_for(
@@ -156,7 +164,8 @@ def power_for(
     surplus = outlook.surplus - ramp_power
     aim_c += outlook.heater_k * (_counted(surplus, full_k * (bounds[1] - bounds[0])) - surplus)
     error_k = _agreed(setpoint_c - aim_c, outlook.spread_k, bounds)
-    wanted = resting + error_k / (outlook.gain * Tc_s)
+    gain = outlook.gain + max(outlook.gain_sd - VAGUE * outlook.gain, 0.0)
+    wanted = resting + error_k / (gain * Tc_s)
     return clamp(before + (wanted - before) * period_s / (period_s + tau_s), *bounds)
 
 
