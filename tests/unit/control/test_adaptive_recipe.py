@@ -194,7 +194,7 @@ class PlainBank:
             error = max(error - doubt, 0.0)
         elif self.u_min < 0:
             error = min(error + doubt, 0.0)
-        doubted = beta + max(math.sqrt(variance) - 0.25 * beta, 0.0)
+        doubted = beta + max(min(math.sqrt(variance), 0.05) - 0.25 * beta, 0.0)
         wanted = u_ss + error / (doubted * Tc)
         u = before + (wanted - before) * self.h / (self.h + tau)
         return min(max(u, self.u_min), self.u_max)

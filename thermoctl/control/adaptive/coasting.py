@@ -57,9 +57,9 @@ some .85. A lag that is mistaken then costs more: where the range of power has s
 AT_REST, REST = 2.2, 0.08
 """Within so small a surplus of power that heat counts so many times. At rest it is the answer to
 noise that has passed, and what is taken back of it need not be cooled away."""
-VAGUE = 0.25
-"""A gain is taken to be larger by what its deviation exceeds this share of it. Else a start in
-water that is nearly warm would ask for all the power there is, and learn by passing by."""
+VAGUE, VAGUE_MOST = 0.25, 0.05
+"""A gain is taken to be larger by what its deviation, .05 K/s of it at most, exceeds a quarter of it.
+Else a start in water that is nearly warm would ask for all the power there is."""
 CAUTION, AGREED_K = 1.0, 0.05
 """An error is acted on but for so many standard deviations among the hypotheses beyond the latter.
 What they disagree in is heat on its way. When it has arrived they agree: nothing waits for ever."""
@@ -164,7 +164,7 @@ def power_for(
     surplus = outlook.surplus - ramp_power
     aim_c += outlook.heater_k * (_counted(surplus, full_k * (bounds[1] - bounds[0])) - surplus)
     error_k = _agreed(setpoint_c - aim_c, outlook.spread_k, bounds)
-    gain = outlook.gain + max(outlook.gain_sd - VAGUE * outlook.gain, 0.0)
+    gain = outlook.gain + max(min(outlook.gain_sd, VAGUE_MOST) - VAGUE * outlook.gain, 0.0)
     wanted = resting + error_k / (gain * Tc_s)
     return clamp(before + (wanted - before) * period_s / (period_s + tau_s), *bounds)
 
