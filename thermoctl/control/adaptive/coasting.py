@@ -58,8 +58,8 @@ AT_REST, REST = 2.2, 0.08
 """Within so small a surplus of power that heat counts so many times. At rest it is the answer to
 noise that has passed, and what is taken back of it need not be cooled away."""
 VAGUE, VAGUE_MOST = 0.25, 0.05
-"""A gain is taken to be larger by what its deviation, .05 K/s of it at most, exceeds a quarter of it.
-Else a start in water that is nearly warm would ask for all the power there is."""
+"""A gain is taken to be larger by what its deviation, .05 K/s of it at most, exceeds a quarter of
+it. Else a start in water that is nearly warm would ask for all the power there is."""
 CAUTION, AGREED_K = 1.0, 0.05
 """An error is acted on but for so many standard deviations among the hypotheses beyond the latter.
 What they disagree in is heat on its way. When it has arrived they agree: nothing waits for ever."""
