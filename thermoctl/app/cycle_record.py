@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import Any
 
+from thermoctl.services.store import Latch
 from thermoctl.signals import Cycle, Estimate, Feasible, ShadowScore
 
 _ENCODER = json.JSONEncoder(allow_nan=False)
@@ -76,3 +77,18 @@ def _flat(told: Feasible | ShadowScore) -> dict[str, Any]:
 
 def _innovation(estimate: Estimate) -> float:
     return math.nan if estimate.rejected else estimate.innovation
+
+
+def latch_row(loop: str, latch: Latch) -> dict[str, Any]:
+    """Return a stored latch as the alarm that it was, and will be again."""
+    return {
+        "loop": loop,
+        "code": latch.code,
+        "fault": latch.fault,
+        "priority": 1,
+        "since": iso_time(latch.since_utc_s),
+        "active": True,
+        "latched": True,
+        "acknowledged": False,
+        "text": latch.text,
+    }

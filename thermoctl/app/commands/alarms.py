@@ -20,7 +20,7 @@ from thermoctl.app.commands.options import (
     state_option,
 )
 from thermoctl.app.commands.service import settings_of, state_of_daemon
-from thermoctl.app.cycle_record import iso_time
+from thermoctl.app.cycle_record import latch_row
 from thermoctl.app.settings import ETC, Settings
 from thermoctl.errors import NotPermitted, NotRunning, Refused, Unavailable
 from thermoctl.services.control_client import ControlClient
@@ -56,7 +56,7 @@ def alarms(
     if client is None:
         settings = _left_settings(configs)
         latches = _latches(settings, state_of_daemon(settings, state))
-        rows = [_row(name, latch) for name, (latch, _) in latches.items()]
+        rows = [latch_row(name, latch) for name, (latch, _) in latches.items()]
     else:
         with client:
             rows = client.ask("alarms")["alarms"]
@@ -111,7 +111,7 @@ def ack(
             raise Refused(
                 f"the daemon did not clear {latch.code} of {name}: its cause still stands"
             )
-    rows = [_row(name, latch) | _GONE for name, (latch, _) in latches.items()]
+    rows = [latch_row(name, latch) | _GONE for name, (latch, _) in latches.items()]
     _tell(rows, "no loop is latched", as_json)
 
 
@@ -191,17 +191,3 @@ def _comes_back(store: LatchStore, loop: str) -> bool:
     while time.monotonic() < until_s:
         time.sleep(0.1)
     return store.exists(loop)
-
-
-def _row(loop: str, latch: Latch) -> dict[str, Any]:
-    return {
-        "loop": loop,
-        "code": latch.code,
-        "fault": latch.fault,
-        "priority": 1,
-        "since": iso_time(latch.since_utc_s),
-        "active": True,
-        "latched": True,
-        "acknowledged": False,
-        "text": latch.text,
-    }

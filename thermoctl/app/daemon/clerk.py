@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final, Protocol
 
 from thermoctl import __version__
-from thermoctl.app.cycle_record import cycle_record, iso_time
+from thermoctl.app.cycle_record import cycle_record, iso_time, latch_row
 from thermoctl.app.daemon.cycle_wire import details_of
 from thermoctl.app.plugins import BadOption
 from thermoctl.errors import ConfigError
@@ -185,7 +185,10 @@ class Clerk:
 
     def _rows(self, name: str) -> list[dict[str, Any]]:
         cycle = self._seen.get(name)
-        return [] if cycle is None else [self._row(name, each) for each in cycle.step.alarms]
+        if cycle is not None:
+            return [self._row(name, each) for each in cycle.step.alarms]
+        kept = self._latches.load(name)  # a loop that has not begun yet has not forgotten
+        return [] if kept is None else [latch_row(name, kept)]
 
     def _row(self, name: str, alarm: Alarm) -> dict[str, Any]:
         return {
@@ -276,7 +279,8 @@ class Clerk:
         return self._once_settled(asked, content)
 
     def _latched(self, name: str) -> bool:
-        return any(alarm.latched for alarm in self._seen[name].step.alarms)
+        cycle = self._seen.get(name)
+        return cycle is not None and any(alarm.latched for alarm in cycle.step.alarms)
 
     def _once_settled(
         self, asked: Asked, content: Callable[[], Mapping[str, Any] | None]

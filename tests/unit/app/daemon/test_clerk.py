@@ -189,3 +189,13 @@ def test_a_latch_is_listed_since_its_own_time_and_acknowledged_once_its_file_is_
     desk.latches.clear("tank")
     assert [each["code"] for each in pending()["acknowledged"]] == [latched.code]
     assert desk.ask("alarms") == {"alarms": []}
+
+
+def test_before_its_first_cycle_a_loop_has_the_alarm_that_latched_it_in_its_last_run(tmp_path):
+    desk = Desk(tmp_path)
+    assert desk.ask("alarms") == {"alarms": []}
+    desk.latches.save("tank", Latch("trip.over_temperature", "61 degC", 5, 1.6e9))
+    (row,) = desk.ask("alarms")["alarms"]
+    assert (row["code"], row["latched"]) == ("trip.over_temperature", True)
+    pending = desk.ask("ack")
+    assert pending() is None  # nobody has asked the loop yet, and nobody falls over it
