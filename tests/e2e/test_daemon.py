@@ -85,6 +85,8 @@ def test_a_latch_survives_kill_and_restart_and_only_ack_clears_it(start):
     daemon.wait_for("latch.kept")
     listed = json.loads(daemon.call("alarms", "--json").stdout)
     assert [row["code"] for row in listed] == ["trip.over_temperature"]
+    # before its first reading a loop cannot know that the cause is gone, and says so
+    daemon.wait_until(lambda: daemon.ask("get", "state").returncode == 0, "first cycle")
     done = daemon.call("alarms", "ack")
     assert (done.returncode, latch.exists()) == (0, False)
     daemon.wait_for("alarm.acknowledged")
