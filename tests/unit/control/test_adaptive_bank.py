@@ -87,6 +87,7 @@ def test_covariances_stay_symmetric_to_the_last_bit_and_positive():
     assert belief.noise.samples > 1000
 
 
+@pytest.mark.slow
 def test_a_fortnight_of_quiet_regulation_wears_nothing_out():
     bank = Bank(period_s=60.0)
     belief = bank.start()

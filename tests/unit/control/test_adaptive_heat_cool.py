@@ -15,6 +15,8 @@ from thermoctl.control.pid import Pid
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 BETA, LAG_S = 0.04, 20.0
 
 

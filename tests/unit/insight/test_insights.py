@@ -14,6 +14,8 @@ from thermoctl.insight import Gate, Insights
 from thermoctl.runtime.clock import SimulatedClock
 from thermoctl.signals import Measurement, Quality, SetPoint
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 AT = 5400
 
 

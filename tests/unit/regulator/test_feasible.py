@@ -9,6 +9,8 @@ from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
 from thermoctl.signals import Measurement, Mode, SetPoint, State
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 UNREACHABLE = "setpoint.unreachable"
 DRIVEN = "plant.driven"
 
