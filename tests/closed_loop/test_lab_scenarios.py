@@ -31,10 +31,10 @@ class Row:
 
 
 ROWS = {
-    "warm-up": Row({"overshoot_k": 0.15}, {"settled_s": 3.6}),
+    "warm-up": Row({"overshoot_k": 0.15}, {"settled_s": 2.5}),
     "regulation": Row({"largest_k": 0.15, "travel_per_min": 0.7}, {"deviation_k": 2.3}),
-    "step": Row({"overshoot_k": 0.15, "settled_s": 210.0}, {}),
-    "second-heater": Row({"largest_k": 0.27, "settled_s": 320.0}, {}),
+    "step": Row({"overshoot_k": 0.15, "settled_s": 120.0}, {}),
+    "second-heater": Row({"largest_k": 0.25, "settled_s": 250.0}, {}),
 }
 
 
@@ -42,8 +42,21 @@ def test_every_scenario_of_a_lab_has_figures_to_meet():
     assert set(ROWS) == set(FLEETS["tclab"].scenarios)
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("name", ROWS)
+CREEPS = pytest.mark.xfail(
+    strict=True,
+    reason="the last .3 K take two minutes: the loss is learnt anew at every set point; measured "
+    "3.42 times the bound, 195 s after a step, and .253 K and 302 s with the second heater",
+)
+
+
+def cases():
+    """Return every scenario on three boards; the law misses three figures on the first."""
+    missed = {("warm-up", 0), ("step", 0), ("second-heater", 0)}
+    for case in ((name, seed) for name in ROWS for seed in range(3)):
+        yield pytest.param(*case, marks=[CREEPS] if case in missed else [])
+
+
+@pytest.mark.parametrize(("name", "seed"), list(cases()))
 def test_the_default_law_meets_its_figures_on_a_lab(name, seed):
     where, scenario = plant("tclab", seed), SCENARIOS[name]
     trace = play(LAW.plan_for(where), where, scenario)

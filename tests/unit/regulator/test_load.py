@@ -26,21 +26,39 @@ def lowest(drive, seconds, load):
     return low_c
 
 
-@pytest.mark.parametrize(
-    ("controller", "share"), [("adaptive", 0.65), ({"kind": "pid", "gain_per_k": 0.4}, 0.5)]
-)
-def test_the_dip_is_a_part_of_what_it_would_be(drive_with, controller, share):
-    # `adaptive` notices within seconds by itself that the loss has changed: .14 K, now .09.
-    dips = []
+def dips(drive_with, controller):
+    """Return how far the temperature falls by a load that nobody told, and by one that was told."""
+    found = []
     for announced in (False, True):
         drive = drive_with(water_c=32.0, controller=controller)
         drive.run(1200)
         before_c = drive.water_c
         if announced:
             drive.regulator.request(Load(LOAD, 300.0))
-        dips.append(before_c - lowest(drive, 300, LOAD))
-    assert 0.0 < dips[1] < share * dips[0]
-    assert dips[1] < 0.15
+        found.append(before_c - lowest(drive, 300, LOAD))
+    return found
+
+
+SOON_NOTICED = pytest.mark.xfail(
+    strict=True, reason="adaptive notices a load by itself: .14 K unannounced, .09 K announced"
+)
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [pytest.param("adaptive", marks=SOON_NOTICED), {"kind": "pid", "gain_per_k": 0.4}],
+)
+def test_the_dip_is_at_most_half_of_what_it_would_be(drive_with, controller):
+    unannounced_k, announced_k = dips(drive_with, controller)
+    assert 0.0 < announced_k < 0.5 * unannounced_k
+
+
+def test_the_default_law_dips_by_a_tenth_of_a_kelvin_at_most_when_told_and_less_than_untold(
+    drive_with,
+):
+    unannounced_k, announced_k = dips(drive_with, "adaptive")
+    assert 0.0 < announced_k < 0.1
+    assert announced_k < unannounced_k < 0.2
 
 
 def test_the_loss_that_was_learnt_is_not_disturbed(drive_with):
