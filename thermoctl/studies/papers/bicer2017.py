@@ -22,10 +22,9 @@ from thermoctl.studies.papers.bicer2017_figure import draw_page
 from thermoctl.studies.papers.study import (
     Column,
     Outcome,
+    Repeated,
     Row,
-    at_least_one,
     generator,
-    not_negative,
 )
 
 PERIOD: Final = 0.1
@@ -173,7 +172,7 @@ class Totals:
 
 
 @dataclass(frozen=True, slots=True)
-class Bicer2017:
+class Bicer2017(Repeated):
     """The compartment study of BO17, and what becomes of it with an exact model.
 
     Parameters
@@ -196,11 +195,6 @@ class Bicer2017:
         Column("hkt", "sum of squared errors", ".2f"),
     )
     replications: int = 100
-    seed: int = 1
-
-    def __post_init__(self) -> None:
-        at_least_one("replications", self.replications)
-        not_negative("seed", self.seed)
 
     def run(self) -> Iterator[Outcome]:
         """Yield what is known after each batch of replications; the last is the whole."""

@@ -27,16 +27,12 @@ from thermoctl.studies.papers.control27_loop import (
     close_loop,
 )
 from thermoctl.studies.papers.study import (
+    Batched,
     Column,
     Outcome,
     Row,
-    at_least_one,
     generator,
-    not_negative,
 )
-
-BATCH: Final = 250
-"""Replications computed together."""
 
 SCORED_FROM: Final = 20
 """First sample that counts: before, a is still being found from nothing."""
@@ -48,7 +44,7 @@ _SCORES: Final = ("mse", "bias", "input_travel", "largest", "mse_a")
 
 
 @dataclass(frozen=True, slots=True)
-class Control27:
+class Control27(Batched):
     """Eight ways to know a in the loop of O21 (27), over five plants.
 
     Parameters
@@ -67,8 +63,6 @@ class Control27:
     """
 
     replications: int = 1000
-    seed: int = 1
-    batch: int = BATCH
 
     title: ClassVar[str] = "O21 (27): a temperature held by minimum variance while a(t) changes"
     columns: ClassVar[tuple[Column, ...]] = (
@@ -80,11 +74,6 @@ class Control27:
         Column("largest", "largest\ndeviation, K", ".2f"),
         Column("mse_a", "mean square\nerror of a", ".1e"),
     )
-
-    def __post_init__(self) -> None:
-        at_least_one("replications", self.replications)
-        at_least_one("batch", self.batch)
-        not_negative("seed", self.seed)
 
     def run(self) -> Iterator[Outcome]:
         """Yield what is known after each batch of replications, at last the whole."""

@@ -24,10 +24,9 @@ from thermoctl.studies.papers.lainiotis_figure import draw_page
 from thermoctl.studies.papers.study import (
     Column,
     Outcome,
+    Repeated,
     Row,
-    at_least_one,
     generator,
-    not_negative,
 )
 
 SAMPLES: Final = 300
@@ -179,7 +178,7 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True)
-class Lainiotis:
+class Lainiotis(Repeated):
     """Selection of order and delay by a bank of filters.
 
     Parameters
@@ -203,11 +202,6 @@ class Lainiotis:
         Column("right", "right at\nthe end", ".2f"),
     )
     replications: int = 100
-    seed: int = 1
-
-    def __post_init__(self) -> None:
-        at_least_one("replications", self.replications)
-        not_negative("seed", self.seed)
 
     def run(self) -> Iterator[Outcome]:
         """Yield what is known after each batch of replications; the last is the whole."""

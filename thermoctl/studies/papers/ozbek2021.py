@@ -22,20 +22,16 @@ from thermoctl.quantities import Array
 from thermoctl.studies.papers.ozbek2021_figure import draw_ozbek2021
 from thermoctl.studies.papers.ozbek2021_methods import METHODS, P0, POLE, SAMPLES, Method, outputs
 from thermoctl.studies.papers.study import (
+    Batched,
     Column,
     Outcome,
     Row,
-    at_least_one,
     generator,
-    not_negative,
 )
-
-BATCH: Final = 250
-"""Replications computed together: nearly as fast as more, and Ctrl-C need not wait long."""
 
 
 @dataclass(frozen=True, slots=True)
-class Ozbek2021:
+class Ozbek2021(Batched):
     """Seven estimators on the simulation of O21 (24).
 
     Parameters
@@ -54,8 +50,6 @@ class Ozbek2021:
     """
 
     replications: int = 1000
-    seed: int = 1
-    batch: int = BATCH
 
     title: ClassVar[str] = "O21 (24): a parameter that jumps after samples 100 and 200"
     columns: ClassVar[tuple[Column, ...]] = (
@@ -67,11 +61,6 @@ class Ozbek2021:
         Column("final_P_median", "last P,\nmedian", ".5f"),
         Column("residual_variance", "variance of\nresiduals", ".3f"),
     )
-
-    def __post_init__(self) -> None:
-        at_least_one("replications", self.replications)
-        at_least_one("batch", self.batch)
-        not_negative("seed", self.seed)
 
     def run(self) -> Iterator[Outcome]:
         """Yield what is known after each batch of replications, at last the whole."""

@@ -58,6 +58,54 @@ class Outcome:
     figures: Mapping[str, Mapping[str, Any]]
 
 
+@dataclass(frozen=True, slots=True)
+class Repeated:
+    """The settings of every study.
+
+    Parameters
+    ----------
+    replications : int
+        Independent runs, at least 1.
+    seed : int
+        Of all noise, at least 0.
+
+    Raises
+    ------
+    ValueError
+        `replications` is no integer of at least 1, or `seed` none of at least 0.
+    """
+
+    replications: int
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        _integer("replications", self.replications, 1)
+        _integer("seed", self.seed, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Batched(Repeated):
+    """The settings of a study whose replications are computed together.
+
+    Parameters
+    ----------
+    batch : int
+        How many at once, at least 1; it changes nothing but the time taken. More are hardly
+        faster, and Ctrl-C has to wait for them.
+
+    Raises
+    ------
+    ValueError
+        As for `Repeated`, or `batch` is no integer of at least 1.
+    """
+
+    batch: int = 250
+
+    def __post_init__(self) -> None:
+        Repeated.__post_init__(self)
+        _integer("batch", self.batch, 1)
+
+
 class Study(Protocol):
     """A study of a paper, with its settings."""
 
@@ -80,13 +128,7 @@ def generator(seed: int, replication: int) -> np.random.Generator:
     return np.random.default_rng((seed, replication))
 
 
-def at_least_one(name: str, value: int) -> None:
-    """Raise ``ValueError`` unless `value` is an integer of 1 or more."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
-
-
-def not_negative(name: str, value: int) -> None:
-    """Raise ``ValueError`` unless `value` is an integer of 0 or more."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise ValueError(f"{name} must be an integer of at least 0, got {value!r}")
+def _integer(name: str, value: int, least: int) -> None:
+    """Raise ``ValueError`` unless `value` is an integer of `least` or more."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ValueError(f"{name} must be an integer of at least {least}, got {value!r}")
