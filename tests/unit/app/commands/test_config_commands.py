@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import resource
 import tomllib
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -271,19 +272,24 @@ def test_options_that_contradict_each_other_write_nothing(run, tmp_path):
     assert not path.exists()
 
 
-@pytest.fixture
+@contextmanager
 def short_files():
-    """Let no file grow beyond a hundred bytes, as on a disk that is full."""
+    """Let no file grow beyond a hundred bytes, as on a disk that is full.
+
+    Not a fixture: the runner writes its own lines between the parts of a test, perhaps to a file.
+    """
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-@pytest.mark.usefixtures("short_files")
 def test_a_file_that_cannot_be_written_whole_is_named_and_not_left_behind(run, tmp_path):
     path = tmp_path / "new.toml"
-    code, _, err = run("config", "new", "--yes", "-o", path)
+    with short_files():
+        code, _, err = run("config", "new", "--yes", "-o", path)
     assert (code, err) == (1, f"thermoctl: {path}: File too large\n")
     assert not path.exists()
 
