@@ -217,14 +217,14 @@ def _rates(
     wetted = k.base_share + (1.0 - k.base_share) * level
     still_glass_w = wetted * k.still_wall_share * k.inner_w_per_k * (still_c - wall_c)
     glass_w = wetted * (1.0 - k.still_wall_share) * k.inner_w_per_k * (water_c - wall_c)
-
     vapour_kg = evaporation_kg_per_s(k, water_c, water_kg)
     vapour_w = vapour_kg * (WATER_J_PER_KG_K * water_c + vaporisation_j_per_kg(water_c))
     melting_w = k.ice_melting_w_per_kg_k * ice_kg * water_c
     melted_kg = melting_w / FUSION_J_PER_KG
     gained_kg = melted_kg - vapour_kg
     # The zones keep their shares: what the one gains or loses flows on to or from the other.
-    passed_w = k.still_share * gained_kg * WATER_J_PER_KG_K * (water_c if gained_kg > 0.0 else still_c)
+    passed_c = water_c if gained_kg > 0.0 else still_c
+    passed_w = k.still_share * gained_kg * WATER_J_PER_KG_K * passed_c
     wall_w, bath_w, room_w, thawed_kg = _outside(k, wall_c, unrest, bath_j, bath_kg, bath_ice_kg)
     return (
         heater_w - heating_w,
