@@ -99,8 +99,10 @@ class Acquisition:
         )
         self._top = 2.0**parameters.bits - 1.0
         self._counts_per_v = 2.0**parameters.bits / parameters.reference_v
-        self._noise_v: Array = np.empty((0, parameters.conversions))
+        self._pickup = parameters.pickup_v * self._counts_per_v
+        self._noise: Array = np.empty((0, parameters.conversions))
         self._row = 0
+        self._reach = 0.0  # no conversion of this block lies farther from its voltage, in counts
 
     def advance(self, interval_s: float) -> None:
         """Let `interval_s` pass; the mains turn on."""
@@ -121,22 +123,25 @@ class Acquisition:
         if math.isnan(volts):
             raise ValueError("volts must be a number or infinite, got nan")
         hz = self._parameters.mains_hz + self._frequency.value
-        seen_v = np.sin(self._phase + TWO_PI * hz * self._offsets_s)
-        seen_v *= self._parameters.pickup_v
-        seen_v += self._next_noise()
-        seen_v += volts
-        seen_v *= self._counts_per_v
-        np.rint(seen_v, out=seen_v)
-        np.maximum(seen_v, 0.0, out=seen_v)
-        np.minimum(seen_v, self._top, out=seen_v)
-        return int(seen_v.sum())
+        level, noise = volts * self._counts_per_v, self._next_noise()
+        seen = np.sin(self._phase + TWO_PI * hz * self._offsets_s)
+        seen *= self._pickup
+        seen += noise
+        seen += level
+        np.rint(seen, out=seen)
+        if not self._reach < level < self._top - self._reach:  # else none meets an end of the scale
+            np.maximum(seen, 0.0, out=seen)
+            np.minimum(seen, self._top, out=seen)
+        return int(np.add.reduce(seen))
 
     def _next_noise(self) -> Array:
-        """Return white noise for one burst; drawn in blocks, at less than half the price."""
-        if self._row == len(self._noise_v):
+        """Return white noise in counts for one burst; in blocks, at less than half the price."""
+        if self._row == len(self._noise):
             shape = (BLOCK_BURSTS, self._parameters.conversions)
-            self._noise_v = self._rng.standard_normal(shape) * self._parameters.noise_v
+            deviation = self._parameters.noise_v * self._counts_per_v
+            self._noise = self._rng.standard_normal(shape) * deviation
+            self._reach = self._pickup + float(np.abs(self._noise).max()) + 1.0  # for rounding
             self._row = 0
         self._row += 1
-        row: Array = self._noise_v[self._row - 1]
+        row: Array = self._noise[self._row - 1]
         return row

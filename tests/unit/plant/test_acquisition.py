@@ -92,6 +92,18 @@ def test_open_reads_full_scale_and_short_reads_near_zero():
     assert acquisition.convert(0.0) < 0.01 * usual.full_scale
 
 
+@pytest.mark.parametrize("end", [0.0, 1023.0], ids=["bottom", "top"])
+def test_at_an_end_of_the_scale_every_conversion_is_limited_and_not_the_burst(end):
+    noisy = AcquisitionParameters(pickup_v=0.0, noise_v=0.1)
+    volts, rms = end * noisy.reference_v / 1024.0, 0.1 * 1024.0 / noisy.reference_v
+    acquisition = Acquisition(noisy, np.random.default_rng(8))
+    off = np.array([acquisition.convert(volts) / 32.0 - end for _ in range(400)])
+    inwards = off if end == 0.0 else -off
+    assert (inwards > 0.0).all()
+    # Half of the noise is cut off; the mean of what is left is rms / sqrt(2 pi).
+    assert inwards.mean() == pytest.approx(rms / math.sqrt(2.0 * math.pi), rel=0.05)
+
+
 def test_no_voltage_at_all_cannot_be_converted():
     with pytest.raises(ValueError, match="volts"):
         Acquisition(AcquisitionParameters(), np.random.default_rng(0)).convert(math.nan)
