@@ -15,7 +15,7 @@ from typing import Any
 from thermoctl.services.store import Latch
 from thermoctl.signals import Cycle, Estimate, Feasible, ShadowScore
 
-_ENCODER = json.JSONEncoder(allow_nan=False)
+_ENCODER = json.JSONEncoder(allow_nan=False, check_circular=False)  # a record is made afresh
 
 
 def finite(value: float | None) -> float | None:
@@ -31,7 +31,9 @@ def iso_time(utc_s: float) -> str | None:
 
 def as_line(cycle: Cycle, beside: Mapping[str, Any] = MappingProxyType({})) -> str:
     """Return the cycle, and keys found beside it, as one JSON object."""
-    return _ENCODER.encode({**cycle_record(cycle), **beside})
+    record = cycle_record(cycle)
+    record.update(beside)
+    return _ENCODER.encode(record)
 
 
 def cycle_record(cycle: Cycle) -> dict[str, Any]:
@@ -62,7 +64,7 @@ def cycle_record(cycle: Cycle) -> dict[str, Any]:
         "shadow": step.shadow,
         "shadow_power": step.shadow_power,
         "shadow_score": None if step.shadow_score is None else _flat(step.shadow_score),
-        "feasible": {name: finite(value) for name, value in _flat(step.feasible).items()},
+        "feasible": _flat(step.feasible),
         "tick_us": round(cycle.tick_us, 1),
         "late_s": round(cycle.late_s, 6),
         "alarms": [alarm.code for alarm in step.alarms],
@@ -70,9 +72,9 @@ def cycle_record(cycle: Cycle) -> dict[str, Any]:
     }
 
 
-def _flat(told: Feasible | ShadowScore) -> dict[str, Any]:
+def _flat(told: Feasible | ShadowScore) -> dict[str, float | None]:
     """Return the numbers of `told` by name; `asdict` would copy each of them as if it were deep."""
-    return {name: getattr(told, name) for name in told.__slots__}
+    return {name: finite(getattr(told, name)) for name in told.__slots__}
 
 
 def _innovation(estimate: Estimate) -> float:
