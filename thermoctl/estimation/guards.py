@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thermoctl.estimation.belief import LARGEST, frozen, positive, truth
+from thermoctl.estimation.belief import LARGEST, frozen, positive, scalar, truth
 from thermoctl.estimation.kalman import CorrectedKalman, RandomWalkKalman
 from thermoctl.estimation.least_squares import RecursiveLeastSquares
-from thermoctl.estimation.recursion import RecursiveLaw
-from thermoctl.estimation.stack import Stacked, stack
+from thermoctl.estimation.recursion import RecursiveLaw, regressor
+from thermoctl.estimation.stack import Learned, Stacked, stack, unstacked
 from thermoctl.quantities import Array, clamp
 from thermoctl.signals import Estimate
 
@@ -38,12 +38,13 @@ _WITH_R2 = (CorrectedKalman, RandomWalkKalman)
 class _Memory(NamedTuple):
     """What the guards remember: spread of the regressor, parallel least squares, residuals.
 
-    The residuals are there twice, newest first and by size; nobody writes to either.
+    The least squares are a stack of theta and P. The residuals are there twice, newest first and by
+    size; nobody writes to either.
     """
 
     phi_mean: tuple[float, ...]
     spread_squared: float
-    parallel: Estimate
+    parallel: Array
     residuals: tuple[float, ...] = ()
     ranked: Sequence[float] = ()
 
@@ -130,36 +131,35 @@ class Guarded:
         TypeError, ValueError
             As the bare law.
         """
+        phi, y = regressor(phi), scalar("y", y)
         before = belief if isinstance(belief, GuardedEstimate) else _adopted(belief)
-        law = self._law(before._memory)
-        learned = law.update(before, phi, y)
-        if learned.rejected:
+        law, rows = self._law(before._memory), stack(before)
+        learned = law.learn(rows, phi, y)
+        if learned is None:
             return replace(before, rejected=True)
-        memory = self._remembered(before, phi, y)
+        memory = self._remembered(before._memory, rows, phi, y)
         excitation = math.sqrt(memory.spread_squared)
-        paused = self.excitation_min is not None and excitation < self.excitation_min
-        P = before.P if paused else self._bounded(learned.P)
-        after = GuardedEstimate(
-            before.theta if paused else learned.theta,
-            P,
-            learned.innovation,
-            learned.innovation_var,
-            1.0 if paused else learned.inflation,
-            paused,
-            excitation,
-            getattr(law, "R2", math.nan),
-            memory,
-        )
-        if P is learned.P:
-            object.__setattr__(after, "rows", stack(learned))
+        R2 = getattr(law, "R2", math.nan)
+        if self.excitation_min is not None and excitation < self.excitation_min:
+            return _paused(before, learned, excitation, R2, memory)
+        after = unstacked(GuardedEstimate, self._bounded(learned[0]), *learned[1:])
+        _set_excitation(after, excitation)
+        _set_R2(after, R2)
+        _set_memory(after, memory)
         return after
 
-    def _bounded(self, P: Array) -> Array:
-        """Return P with no variance above `covariance_max` and its correlations kept."""
-        if self.covariance_max is None or max(P.diagonal().tolist()) <= self.covariance_max:
-            return P
-        d = np.sqrt(self.covariance_max / np.maximum(P.diagonal(), self.covariance_max))
-        return frozen(np.multiply.outer(d, d) * P)
+    def _bounded(self, rows: Array) -> Array:
+        """Return `rows` with no variance above `covariance_max` and the correlations kept."""
+        most = self.covariance_max
+        if most is None:
+            return rows
+        variances = rows[1:].diagonal()
+        if max(variances.tolist()) <= most:
+            return rows
+        d = np.sqrt(most / np.maximum(variances, most))
+        bounded = rows.copy()
+        bounded[1:] *= np.multiply.outer(d, d)
+        return frozen(bounded)
 
     def _law(self, memory: _Memory | None) -> RecursiveLaw:
         """Return the law with the R2 of the moment."""
@@ -172,18 +172,20 @@ class Guarded:
         R2 = clamp(max(sd * sd, least), 1.0 / LARGEST, LARGEST)
         return law if R2 == law.R2 else replace(law, R2=R2)
 
-    def _remembered(self, before: GuardedEstimate, phi: Array, y: float) -> _Memory:
-        """Return the memory after a usable sample."""
-        memory, values = before._memory, np.asarray(phi, dtype=np.float64).tolist()
+    def _remembered(self, memory: _Memory | None, rows: Array, phi: Array, y: float) -> _Memory:
+        """Return the memory after a usable sample; it begins with the stack `rows`."""
+        values = phi.tolist()
         if memory is None:
-            scale = getattr(self.law, "R2", 1.0)  # least squares counts in units of the noise
-            parallel = Estimate(before.theta, frozen(before.P / scale))
-            memory = _Memory(tuple(values), 0.0, parallel)
+            parallel = rows.copy()
+            parallel[1:] /= getattr(self.law, "R2", 1.0)  # least squares counts in units of noise
+            memory = _Memory(tuple(values), 0.0, frozen(parallel))
         phi_mean, spread_squared = _moved(memory, values)
         if not self.robust_R2:
             return _Memory(phi_mean, spread_squared, memory.parallel)
-        parallel = PARALLEL.update(memory.parallel, phi, y)
-        newest = None if parallel.rejected else abs(parallel.innovation)
+        parallel, newest = memory.parallel, None
+        learned = PARALLEL.learn(parallel, phi, y)
+        if learned is not None:
+            parallel, newest = learned[0], abs(learned[1])
         residuals, ranked = _renewed(memory.residuals, memory.ranked, newest)
         return _Memory(phi_mean, spread_squared, parallel, residuals, ranked)
 
@@ -199,6 +201,15 @@ def _adopted(belief: Estimate) -> GuardedEstimate:
         belief.innovation_var,
         belief.inflation,
         belief.rejected,
+    )
+
+
+def _paused(
+    before: GuardedEstimate, learned: Learned, excitation: float, R2: float, memory: _Memory
+) -> GuardedEstimate:
+    """Return theta and P as they were, with what the sample says of itself."""
+    return GuardedEstimate(
+        before.theta, before.P, learned[1], learned[2], 1.0, True, excitation, R2, memory
     )
 
 
@@ -225,3 +236,9 @@ def _renewed(
         insort(ranked, newest)
         residuals = (newest, *residuals)
     return residuals, ranked
+
+
+# As in `thermoctl.estimation.stack`: quicker than through the frozen dataclass.
+_set_excitation = vars(GuardedEstimate)["excitation"].__set__
+_set_R2 = vars(GuardedEstimate)["R2"].__set__  # noqa: N816 - R2 keeps its letter
+_set_memory = vars(GuardedEstimate)["_memory"].__set__

@@ -9,7 +9,7 @@ covariance is inflated afterwards.
     \theta \leftarrow \theta + P\varphi\, e / S, \qquad
     P \leftarrow \lambda\,(P - P\varphi\varphi^T P / S) + R_1
 
-The letters of `RecursiveLaw.update`: `rows` are theta and P (`thermoctl.estimation.stack`), `w`
+The letters of `RecursiveLaw.learn`: `rows` are theta and P (`thermoctl.estimation.stack`), `w`
 their product with phi, which begins with the prediction and goes on with P phi.
 
 Implements section 2 of ``docs/theory.md``.
@@ -25,6 +25,7 @@ from functools import lru_cache
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from thermoctl.estimation.belief import (
     LARGEST,
@@ -35,7 +36,7 @@ from thermoctl.estimation.belief import (
     scalar,
     shown,
 )
-from thermoctl.estimation.stack import stack, unstacked
+from thermoctl.estimation.stack import Learned, Stacked, stack, unstacked
 from thermoctl.quantities import Array, is_finite_number
 from thermoctl.signals import Estimate
 
@@ -100,27 +101,39 @@ class RecursiveLaw(ABC):
             `phi` or `y` does not consist of numbers; `phi` does not have the shape of
             ``belief.theta``, or R1 that of ``belief.P``.
         """
-        if not (isinstance(phi, np.ndarray) and phi.dtype is _FLOAT):
-            phi = floats("phi", phi)
+        phi = regressor(phi)
         if not isinstance(belief, Estimate):
             raise TypeError(f"belief must be an Estimate, got {type(belief).__name__}")
-        if phi.shape != belief.theta.shape:
-            raise ValueError(f"phi must have shape {belief.theta.shape}, got {phi.shape}")
+        learned = self.learn(stack(belief), phi, scalar("y", y))
+        return rejected(belief) if learned is None else unstacked(Stacked, *learned)
+
+    def learn(self, rows: Array, phi: Array, y: float) -> Learned | None:
+        """Return what the stack `rows` becomes; None for a sample that cannot be used.
+
+        It is `update` for who keeps theta and P alone, and has made sure of `phi` and `y`.
+
+        Raises
+        ------
+        ValueError
+            `phi` does not have the shape of theta, or R1 that of P.
+        """
+        if phi.shape != rows.shape[1:]:
+            raise ValueError(f"phi must have shape {rows.shape[1:]}, got {phi.shape}")
         if phi.shape == (1,):
-            return self._update_one(belief, phi.item(), scalar("y", y))
+            return self._learn_one(rows.item(0), rows.item(1), phi.item(), y)
         # Plain floats add up without a warning; the comparison is false for NaN. Once phi, and
         # below e, are known to be sane, nothing here can overflow.
         if not sum(map(abs, phi.tolist())) < LARGEST:
-            return rejected(belief)
-        n, rows = len(phi), stack(belief)
+            return None
+        n = len(phi)
         w = rows.dot(phi)  # ndarray.dot, not @: it is twice as fast on small arrays
-        e = scalar("y", y) - w.item(0)
+        e = y - w.item(0)
         q = float(phi.dot(w[1:]))
         if q < 0.0:  # which rounding can leave of a vanishing one
             q = 0.0
         S, inflation = self.weigh(q, e, n, NUMBERS)
         if not e * e < LARGEST * S < math.inf:
-            return rejected(belief)
+            return None
         # theta gains g e / sqrt(S) while P loses g g', where g = P phi / sqrt(S): with the root
         # on both sides P stays symmetric to the last bit.
         w[0] = -e
@@ -133,32 +146,34 @@ class RecursiveLaw(ABC):
         if isinstance(R1, np.ndarray) or R1:
             P += drift(R1, n)  # O21 (20)
         flat = rows.ravel()
-        if not flat.dot(flat) < LARGEST * LARGEST:
-            return rejected(belief)
-        return unstacked(rows, e, S, inflation)
+        return (frozen(rows), e, S, inflation) if flat.dot(flat) < LARGEST * LARGEST else None
 
-    def _update_one(self, belief: Estimate, phi: float, y: float) -> Estimate:
-        """Return the belief about one parameter: the same in plain floats, in half the time."""
+    def _learn_one(self, theta: float, P: float, phi: float, y: float) -> Learned | None:
+        """Return the same for one parameter: in plain floats it takes half the time."""
         if not abs(phi) < LARGEST:
-            return rejected(belief)
-        before = stack(belief)
-        theta, P = before.item(0), before.item(1)
+            return None
         e, g = y - theta * phi, P * phi
         q = max(g * phi, 0.0)
         S, inflation = self.weigh(q, e, 1, NUMBERS)
         if not e * e < LARGEST * S < math.inf:
-            return rejected(belief)
+            return None
         w = g / math.sqrt(S)
         theta += e / math.sqrt(S) * w  # O21 (18), (19)
         P = (P - w * w) * inflation  # O21 (21), and (25) or (13)
         R1 = self.R1
-        if isinstance(R1, np.ndarray) or R1:
-            P += drift(R1, 1).item()  # O21 (20)
+        P += drift(R1, 1).item() if isinstance(R1, np.ndarray) else R1  # O21 (20)
         if not theta * theta + P * P < LARGEST * LARGEST:
-            return rejected(belief)
+            return None
         rows = np.empty((2, 1))
         rows[0, 0], rows[1, 0] = theta, P
-        return unstacked(rows, e, S, inflation)
+        return frozen(rows), e, S, inflation
+
+
+def regressor(phi: npt.ArrayLike) -> Array:
+    """Return `phi` as an array of floats; ``ValueError`` if it is none."""
+    if isinstance(phi, np.ndarray) and phi.dtype is _FLOAT:  # nearly always
+        return phi
+    return floats("phi", phi)
 
 
 def rejected(belief: Estimate) -> Estimate:

@@ -10,12 +10,15 @@ Implements section 2 of ``docs/theory.md``.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
-from thermoctl.estimation.belief import frozen
 from thermoctl.quantities import Array
 from thermoctl.signals import Estimate
+
+Learned = tuple[Array, float, float, float]
+"""What a sample makes of a stack: the new one, innovation, its variance, inflation of P."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,6 +35,9 @@ class Stacked(Estimate):
     rows: Array | None = field(default=None, init=False, repr=False)
 
 
+S = TypeVar("S", bound=Stacked)
+
+
 def stack(belief: Estimate) -> Array:
     """Return theta and P of `belief` in one array, shape (n + 1, n).
 
@@ -45,10 +51,14 @@ def stack(belief: Estimate) -> Array:
     return rows
 
 
-def unstacked(rows: Array, innovation: float, innovation_var: float, inflation: float) -> Stacked:
-    """Return the estimate that lies in `rows`, read-only from now on."""
-    frozen(rows)
-    belief = object.__new__(Stacked)
+def unstacked(
+    kind: type[S], rows: Array, innovation: float, innovation_var: float, inflation: float
+) -> S:
+    """Return the estimate that lies in the read-only `rows`, of this `kind`.
+
+    Where a kind has fields of its own, they are left to the caller.
+    """
+    belief = object.__new__(kind)
     _set_theta(belief, rows[0])
     _set_P(belief, rows[1:])
     _set_innovation(belief, innovation)
