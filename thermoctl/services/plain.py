@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+_NUMPY = (np.generic, np.ndarray)
+
 
 def plain_text(value: Any) -> str:
     """Return `value` as one printable line, whatever had to be escaped."""
@@ -23,7 +25,9 @@ def as_json(fields: Mapping[str, Any]) -> str:
 
 def _tame(value: Any) -> Any:
     """Reduce to what JSON has: no NaN, no infinity, none of numpy's types."""
-    if isinstance(value, np.generic | np.ndarray):
+    if type(value) is float:  # nearly always, ten times a cycle of a simulation
+        return value if math.isfinite(value) else None
+    if isinstance(value, _NUMPY):
         value = value.tolist()
     if isinstance(value, Mapping):
         return {str(name): _tame(inner) for name, inner in value.items()}

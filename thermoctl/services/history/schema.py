@@ -177,7 +177,7 @@ def readable_from(name: str, version: int) -> str:
 
 def row_of(cycle: Cycle) -> tuple[Value, ...]:
     """Return `cycle` as the values of `COLUMNS`; NaN and infinities become NULL."""
-    return tuple(_STORABLE[column.kind](column.of(cycle)) for column in COLUMNS)
+    return tuple([storable(of(cycle)) for of, storable in _CELLS])
 
 
 def event_row_of(event: Event, loop: str | None) -> tuple[Value, ...]:
@@ -187,13 +187,18 @@ def event_row_of(event: Event, loop: str | None) -> tuple[Value, ...]:
 
 def _real(value: Any) -> float | None:
     """SQLite turns NaN into NULL by itself; infinities it would keep."""
-    number = math.nan if value is None else float(value)
+    if value is None:
+        return None
+    number = float(value)
     return number if math.isfinite(number) else None
 
 
 def _text(value: Any) -> str | None:
     """One lone surrogate would make SQLite refuse the row, and with it the whole batch."""
-    return None if value is None else str(value).encode(errors="replace").decode()
+    if value is None:
+        return None
+    text = str(value)
+    return text if text.isascii() else text.encode(errors="replace").decode()
 
 
 _STORABLE: Final[Mapping[Kind, Callable[[Any], Value]]] = {
@@ -202,3 +207,4 @@ _STORABLE: Final[Mapping[Kind, Callable[[Any], Value]]] = {
     "TEXT": _text,
 }
 """Plain values only: sqlite3 refuses numpy's integers and its float32."""
+_CELLS: Final = tuple((column.of, _STORABLE[column.kind]) for column in COLUMNS)
