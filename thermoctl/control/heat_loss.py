@@ -18,14 +18,13 @@ changes by `BEND` of itself per kelvin, give or take `BEND_SD`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-import numpy as np
-
-from thermoctl.quantities import Array
-
 T, BETA, D, K = range(4)
+Row = tuple[float, ...]
+"""A number for each of the four."""
 
 START_SD = (0.1, 0.15, 0.01, 1e-3)
 """Of T in K, beta and d in K/s, k in 1/s: wide, but for a plant that begins near its rest."""
@@ -91,12 +90,16 @@ class Stretch(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeatBelief:
-    """What is believed of gain and loss; arrays are read-only.
+    """What is believed of gain and loss.
+
+    Plain numbers: for four of them arrays take twice as long.
 
     Parameters
     ----------
-    x, P : ndarray, shape (4,) and (4, 4)
-        Mean and covariance of T in degC, beta and d in K/s, k in 1/s.
+    x : tuple of float
+        Mean of T in degC, beta and d in K/s, k in 1/s.
+    P : tuple of tuple of float
+        Their covariance, row by row.
     centre_c : float
         Temperature of which d is the loss.
     stretches : int
@@ -111,69 +114,80 @@ class HeatBelief:
         Whether the plant's own rate has taken the place of `START_SD`.
     """
 
-    x: Array
-    P: Array
+    x: Row
+    P: tuple[Row, ...]
     centre_c: float
     stretches: int = 0
     R: float = R_FIRST
     before_c: tuple[float, float] = (math.nan, math.nan)
     jumps: float = 0.0
     scaled: bool = False
-    spread: list[list[float]] = field(init=False, repr=False)
-    """P of beta, d and k, for plain reckoning: a number of it is asked a dozen times."""
 
-    def __post_init__(self) -> None:
-        self.x.setflags(write=False)
-        self.P.setflags(write=False)
-        object.__setattr__(self, "spread", self.P[BETA:, BETA:].tolist())
+    @property
+    def finite(self) -> bool:
+        """Whether every number of mean and covariance is finite."""
+        return math.isfinite(sum(self.x) + sum(map(sum, self.P)))
 
     @property
     def gain(self) -> float:
         """Heating rate at full power in K/s; negative where power cools."""
-        return float(self.x[BETA])
+        return self.x[BETA]
 
     @property
     def gain_known(self) -> bool:
         """Whether it is certain that power does something, and in which direction."""
-        return abs(self.gain) > SIGN_SDS * math.sqrt(self.spread[0][0])
+        return abs(self.gain) > SIGN_SDS * math.sqrt(self.P[BETA][BETA])
 
     @property
     def slope(self) -> float:
         """Slope of the loss in 1/s, at least what `WARMS_AT_MOST_K` allows."""
-        return max(float(self.x[K]), abs(self.gain) / WARMS_AT_MOST_K)
+        return max(self.x[K], abs(self.gain) / WARMS_AT_MOST_K)
 
 
 def start(reading_c: float) -> HeatBelief:
     """Return the belief at the first reading."""
-    x, P = np.array([reading_c, 0.0, 0.0, 0.0]), np.diag(np.square(START_SD))
-    return HeatBelief(x, P, reading_c)
+    P = [[0.0] * 4 for _ in START_SD]
+    for each, sd in enumerate(START_SD):
+        P[each][each] = sd * sd
+    return HeatBelief((reading_c, 0.0, 0.0, 0.0), _rows(P), reading_c)
 
 
 def after(belief: HeatBelief, stretch: Stretch) -> HeatBelief:
     """Return the belief after a stretch; without a reading it is carried on."""
-    moved = _predicted(belief, stretch)
-    y = stretch.reading_c
+    x, P = _predicted(belief, stretch)
+    centre_c, y = x[T], stretch.reading_c
     if not math.isfinite(y):
-        return replace(moved, before_c=(math.nan, math.nan), jumps=0.0)
+        unseen = (math.nan, math.nan)
+        return replace(belief, x=x, P=_rows(P), centre_c=centre_c, before_c=unseen, jumps=0.0)
     R = _noise(belief, y)
-    x, P = moved.x, moved.P
-    nu = y - float(x[T])
+    nu = y - x[T]
     jumps = max(0.0, belief.jumps - FORGIVEN)
-    if moved.stretches >= GATE_STRETCHES and nu * nu > GATE * (float(P[T, T]) + R):
+    if belief.stretches >= GATE_STRETCHES and nu * nu > GATE * (P[T][T] + R):
         jumps = belief.jumps + 1.0
-        P = P.copy()
         if jumps < CHANGED_AFTER:
-            P[T, T] += nu * nu
+            P[T][T] += nu * nu
         else:
-            P[BETA:, BETA:] *= 4.0
-    g = P[T] / (float(P[T, T]) + R)
-    x = x + g * nu
-    P = P - np.outer(g, P[T])
-    known = belief.stretches + 1
-    P = 0.5 * (P + P.T)
-    before_c = (y, belief.before_c[0])
-    learnt = HeatBelief(x, P, moved.centre_c, known, R, before_c, jumps, belief.scaled)
+            P = [P[T], *([row[T], *(4.0 * p for p in row[BETA:])] for row in P[BETA:])]
+    x, rows = _met(x, P, T, nu, R)
+    known, before_c = belief.stretches + 1, (y, belief.before_c[0])
+    learnt = HeatBelief(x, rows, centre_c, known, R, before_c, jumps, belief.scaled)
     return learnt if learnt.scaled else _scaled(learnt)
+
+
+def _met(
+    x: Row, P: Sequence[Sequence[float]], place: int, nu: float, R: float
+) -> tuple[Row, tuple[Row, ...]]:
+    """Return `x` and `P` after the number at `place` was seen `nu` higher, with variance `R`."""
+    with_it = P[place]
+    S = with_it[place] + R
+    met = tuple([mean + p / S * nu for mean, p in zip(x, with_it, strict=True)])
+    # Products before quotients: so P stays symmetric to the last bit.
+    return met, tuple(
+        [
+            tuple([p - g * q / S for p, q in zip(row, with_it, strict=True)])
+            for row, g in zip(P, with_it, strict=True)
+        ]
+    )
 
 
 def _scaled(belief: HeatBelief) -> HeatBelief:
@@ -181,39 +195,51 @@ def _scaled(belief: HeatBelief) -> HeatBelief:
 
     Nothing can be known of them before: 50 W in 200 l and 5 kW in 5 l are a factor 4,000 apart.
     """
-    rate, sd = spare(belief, float(belief.x[T]), 1.0)
+    rate, sd = spare(belief, belief.x[T], 1.0)
     if sd > SCALED * abs(rate):
         return belief
     x, P = belief.x, belief.P
-    for row, scale in ((D, LOSS_SHARE * rate), (K, rate / WARMS_AT_LEAST_K)):
-        g = P[row] / (P[row, row] + scale * scale)
-        x = x - g * x[row]
-        P = P - np.outer(g, P[row])
-    return replace(belief, x=x, P=0.5 * (P + P.T), scaled=True)
+    for place, scale in ((D, LOSS_SHARE * rate), (K, rate / WARMS_AT_LEAST_K)):
+        x, P = _met(x, P, place, -x[place], scale * scale)
+    return replace(belief, x=x, P=P, scaled=True)
 
 
-def _predicted(belief: HeatBelief, stretch: Stretch) -> HeatBelief:
-    """Return the belief one stretch later, before its reading is looked at."""
-    span_s, heat_s, x = stretch.span_s, stretch.heat_s, belief.x
-    T_c, beta, d, k = x.tolist()
+def _predicted(belief: HeatBelief, stretch: Stretch) -> tuple[Row, list[list[float]]]:
+    """Return mean and covariance one stretch later, before its reading is looked at."""
+    span_s, heat_s = stretch.span_s, stretch.heat_s
+    T_c, beta, d, k = belief.x
     off_k = T_c - belief.centre_c
     half_k = 0.5 * (heat_s * beta - span_s * (d + k * off_k))
-    F = np.eye(4)
-    F[T, BETA:] = heat_s, -span_s, -span_s * (off_k + half_k)
-    after_c = float(F[T] @ x)
-    move_k = after_c - belief.centre_c
-    F[D, K] = move_k
-    F[K, K] = 1.0 + max(-0.5, BEND * move_k)
-    P = F @ belief.P @ F.T
+    risen_ks = span_s * (off_k + half_k)
+    move_k = off_k + heat_s * beta - span_s * d - risen_ks * k
+    bends = 1.0 + max(-0.5, BEND * move_k)
+
+    def moved(v: Sequence[float]) -> Row:
+        """Return F v: T moves with the heat and the loss, d with k, and k bends."""
+        T_v, beta_v, d_v, k_v = v
+        T_v += heat_s * beta_v - span_s * d_v - risen_ks * k_v
+        return T_v, beta_v, d_v + move_k * k_v, bends * k_v
+
+    columns = [moved(row) for row in belief.P]  # of F P, which is symmetric
+    rows = [moved(row) for row in zip(*columns, strict=True)]  # of F P F'
+    P = [
+        [0.5 * (p + q) for p, q in zip(row, column, strict=True)]
+        for row, column in zip(rows, zip(*rows, strict=True), strict=True)
+    ]
     size, steep = abs(beta), belief.slope
     late_s = LAG_SHARE * stretch.late_s
-    P[T, T] += size * size * (WANDER * WANDER * span_s + late_s * late_s)
-    if P[BETA, BETA] < (VAGUE * size) ** 2:
-        P[BETA, BETA] += (DRIFT_BETA * size) ** 2 * span_s
-        P[D, D] += (DRIFT_D * size) ** 2 * span_s
-    if P[K, K] < (VAGUE * steep) ** 2:
-        P[K, K] += (DRIFT_K * steep) ** 2 * span_s + (BEND_SD * steep * move_k) ** 2
-    return replace(belief, x=F @ x, P=P, centre_c=after_c)
+    P[T][T] += size * size * (WANDER * WANDER * span_s + late_s * late_s)
+    if P[BETA][BETA] < (VAGUE * size) ** 2:
+        P[BETA][BETA] += (DRIFT_BETA * size) ** 2 * span_s
+        P[D][D] += (DRIFT_D * size) ** 2 * span_s
+    if P[K][K] < (VAGUE * steep) ** 2:
+        P[K][K] += (DRIFT_K * steep) ** 2 * span_s + (BEND_SD * steep * move_k) ** 2
+    return moved(belief.x), P
+
+
+def _rows(P: Sequence[Sequence[float]]) -> tuple[Row, ...]:
+    """Return the rows of `P`, which nobody can write to any more."""
+    return tuple(map(tuple, P))
 
 
 def _noise(belief: HeatBelief, y: float) -> float:
@@ -236,9 +262,9 @@ def spare(belief: HeatBelief, at_c: float, power: float, *, straight: bool = Fal
     With a `straight` loss, that is at least as much as with one that bends.
     """
     off_k, steep = at_c - belief.centre_c, belief.slope
-    away_k = at_c - float(belief.x[T])
+    away_k = at_c - belief.x[T]
     bent = 0.0 if straight else 0.5 * steep * away_k * abs(away_k)
-    mean = power * belief.gain - float(belief.x[D]) - steep * off_k - BEND * max(bent, 0.0)
+    mean = power * belief.gain - belief.x[D] - steep * off_k - BEND * max(bent, 0.0)
     variance = _variance(belief, power, -1.0, -off_k) + (BEND_SD * bent) ** 2
     return Known(mean, math.sqrt(variance))
 
@@ -259,11 +285,11 @@ def reach(belief: HeatBelief, power: float) -> Known:
     """
     if not belief.gain_known:
         return Known()
-    now_c, steep = float(belief.x[T]), belief.slope
+    now_c, steep = belief.x[T], belief.slope
     rate = spare(belief, now_c, power)
     rise_k = _bent(rate.mean / steep)
     there = spare(belief, now_c + rise_k, power)
-    steep_sd = math.sqrt(belief.spread[2][2])
+    steep_sd = math.sqrt(belief.P[K][K])
     flatter = max(steep - steep_sd, abs(belief.gain) / WARMS_AT_MOST_K)
     sd_k = max(
         there.sd / (steep * (1.0 + BEND * max(rise_k, 0.0))),
@@ -324,7 +350,7 @@ def arrival(belief: HeatBelief, from_c: float, to_c: float, power: float, rest: 
 
 def _variance(belief: HeatBelief, by_beta: float, by_d: float, by_k: float) -> float:
     """Return the variance of a number with these derivatives."""
-    (bb, bd, bk), (_, dd, dk), (_, _, kk) = belief.spread
+    _, (_, bb, bd, bk), (_, _, dd, dk), (_, _, _, kk) = belief.P
     variance = by_beta * (by_beta * bb + 2.0 * (by_d * bd + by_k * bk))
     variance += by_d * (by_d * dd + 2.0 * by_k * dk) + by_k * by_k * kk
     return max(variance, 0.0)

@@ -179,7 +179,7 @@ class Feasibility:
                 0.5 * (before.late_s + now.late_s),
             ),
         )
-        if not math.isfinite(float(belief.x.sum()) + float(belief.P.sum())):
+        if not belief.finite:
             self._belief = None
             return
         self._belief = belief
@@ -222,17 +222,16 @@ class Feasibility:
     def _tell(self, belief: HeatBelief, wanted: Wanted, t_s: float) -> None:
         """Raise the alarms, or clear them."""
         full, none = self._heat >= FULL * wanted.power_max, self._heat <= NONE
-        texts = {
-            UNREACHABLE: (_missing_sds(belief, wanted, full), _words(self.known, belief, wanted)),
-            DRIVEN: (
-                _driven_sds(belief, wanted) if none else 0.0,
-                _driven_words(belief, wanted),
-            ),
-        }
-        for code, (sds, text) in texts.items():
+        missing_sds = _missing_sds(belief, wanted, full)
+        driven_sds = _driven_sds(belief, wanted) if none else 0.0
+        for code, sds, words in (
+            (UNREACHABLE, missing_sds, _missing_words),
+            (DRIVEN, driven_sds, _driven_words),
+        ):
             standing = self._standings[code]
             news = standing.weigh(sds, counts=wanted.mode is Mode.AUTO)
             if standing.stands:
+                text = words(self.known, belief, wanted)
                 if self._alarms.set(Alarm(code, None, _PRIORITY, t_s, text)) and news:
                     self._emit(code, text=text)
             elif news:
@@ -250,7 +249,7 @@ def _missing_sds(belief: HeatBelief, wanted: Wanted, full: bool) -> float:
     That is the better of two ways to be sure: by the slope that was learnt, and by how slowly the
     plant still moves, which also tells of one that stands at its limit from the start.
     """
-    here_c = float(belief.x[heat_loss.T])
+    here_c = belief.x[heat_loss.T]
     way_k = wanted.setpoint_c - here_c
     towards = math.copysign(1.0, way_k)
     if belief.gain_known and towards * belief.gain < 0.0:
@@ -269,7 +268,7 @@ def _driven_sds(belief: HeatBelief, wanted: Wanted) -> float:
     Something else heats what should be heated: the air, or an output that is stuck at too little
     for `heater.stuck_on`.
     """
-    here_c = float(belief.x[heat_loss.T])
+    here_c = belief.x[heat_loss.T]
     sign = -1.0 if wanted.power_cools else 1.0
     wired_so = belief.gain_known and sign * belief.gain > 0.0
     if not wired_so or sign * (here_c - wanted.setpoint_c) < BEYOND_K:
@@ -278,18 +277,18 @@ def _driven_sds(belief: HeatBelief, wanted: Wanted) -> float:
     return sign * here.mean / here.sd
 
 
-def _driven_words(belief: HeatBelief, wanted: Wanted) -> str:
+def _driven_words(_: Feasible, belief: HeatBelief, wanted: Wanted) -> str:
     """Return what was expected of a plant without power, and what came."""
-    minute_k = 60.0 * heat_loss.spare(belief, float(belief.x[heat_loss.T]), 0.0).mean
+    minute_k = 60.0 * heat_loss.spare(belief, belief.x[heat_loss.T], 0.0).mean
     return (
         f"expected the plant to come to {wanted.setpoint_c:g} degC without power, it moves by "
         f"{minute_k:+.2f} K a minute at {belief.x[heat_loss.T]:.1f} degC"
     )
 
 
-def _words(known: Feasible, belief: HeatBelief, wanted: Wanted) -> str:
+def _missing_words(known: Feasible, belief: HeatBelief, wanted: Wanted) -> str:
     """Return what was expected of the set point, and what came."""
-    here_c = float(belief.x[heat_loss.T])
+    here_c = belief.x[heat_loss.T]
     side = "most" if wanted.setpoint_c > here_c else "least"
     which = "full power" if wanted.power_max == 1.0 else f"a power of {wanted.power_max:g}"
     limit = f"{known.highest_c:.1f} +-{known.highest_sd_k:.1f} degC"
