@@ -17,7 +17,7 @@ from thermoctl.estimation.belief import LARGEST, frozen, positive, scalar, truth
 from thermoctl.estimation.kalman import CorrectedKalman, RandomWalkKalman
 from thermoctl.estimation.least_squares import RecursiveLeastSquares
 from thermoctl.estimation.recursion import RecursiveLaw, regressor
-from thermoctl.estimation.stack import Learned, Stacked, stack, unstacked
+from thermoctl.estimation.stack import Stacked, stack, unstacked
 from thermoctl.quantities import Array, clamp
 from thermoctl.signals import Estimate
 
@@ -140,9 +140,11 @@ class Guarded:
         memory = self._remembered(before._memory, rows, phi, y)
         excitation = math.sqrt(memory.spread_squared)
         R2 = getattr(law, "R2", math.nan)
+        rows, e, S, inflation = learned
         if self.excitation_min is not None and excitation < self.excitation_min:
-            return _paused(before, learned, excitation, R2, memory)
-        after = unstacked(GuardedEstimate, self._bounded(learned[0]), *learned[1:])
+            theta, P = before.theta, before.P
+            return GuardedEstimate(theta, P, e, S, 1.0, True, excitation, R2, memory)
+        after = unstacked(GuardedEstimate, self._bounded(rows), e, S, inflation)
         _set_excitation(after, excitation)
         _set_R2(after, R2)
         _set_memory(after, memory)
@@ -201,15 +203,6 @@ def _adopted(belief: Estimate) -> GuardedEstimate:
         belief.innovation_var,
         belief.inflation,
         belief.rejected,
-    )
-
-
-def _paused(
-    before: GuardedEstimate, learned: Learned, excitation: float, R2: float, memory: _Memory
-) -> GuardedEstimate:
-    """Return theta and P as they were, with what the sample says of itself."""
-    return GuardedEstimate(
-        before.theta, before.P, learned[1], learned[2], 1.0, True, excitation, R2, memory
     )
 
 

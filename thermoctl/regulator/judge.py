@@ -103,7 +103,9 @@ def farthest(measurement: Measurement, limits: Limits) -> tuple[float, float]:
     what is controlled by, for the other one may drift where no actuator could bring the plant.
     """
     shown_c = measurement.temperature_c
-    cold_c, hot_c = measurement.ends_c or (shown_c, shown_c)
+    if not measurement.ends_c:
+        return shown_c, shown_c
+    cold_c, hot_c = measurement.ends_c
     return hot_c if limits.can_heat else shown_c, cold_c if limits.can_cool else shown_c
 
 

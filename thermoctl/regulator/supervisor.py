@@ -70,7 +70,8 @@ class Supervisor:
         self._excess = 0
         self._last_power = 0.0
         self._taken = 0.0  # the last command, or what the actuators made of it
-        self._changeover = Changeover()
+        # Heat and cold take turns only where there are both: then power goes below 0.
+        self._changeover = Changeover() if limits.power_min < 0.0 else None
         self.seen_s = 0.0
         """How much of the time since the last sample a good reading answers for."""
         self.master_released = True
@@ -233,7 +234,8 @@ class Supervisor:
         The one place where limits hold. Falling is never slowed; nothing at all passes in SAFE,
         LATCHED or while a trip waits to be confirmed: safe is 0, for heater and cooler alike.
         """
-        self._changeover = self._changeover.after(self._taken, self.seen_s)
+        if self._changeover is not None:
+            self._changeover = self._changeover.after(self._taken, self.seen_s)
         if self.state in (State.SAFE, State.LATCHED):
             power, reason = 0.0, self._why_off()
         elif self._tripping is not None:
@@ -257,8 +259,10 @@ class Supervisor:
         power = clamp(asked, limits.power_min, limits.power_max)
         if power != asked:
             reason = "limit.high" if asked > power else "limit.low"
-        if self._changeover.waits(power, limits.changeover_s):
+        if self._changeover is not None and self._changeover.waits(power, limits.changeover_s):
             return 0.0, "limit.changeover"
+        if limits.rise_per_s == math.inf:
+            return power, reason
         most = max(math.copysign(self._last_power, self._last_power * power), 0.0)
         most += limits.rise_per_s * self.seen_s
         if abs(power) > most:
