@@ -220,8 +220,9 @@ class Foretelling(Protocol):
     def surprise_k(self, belief: Any, situation: Situation) -> float:
         """Return this reading minus what was expected of it, in K; NaN: not known.
 
-        `belief` is the one before this sample. What was expected may use the power that was
-        applied meanwhile, for that is no merit of the law.
+        `belief` is the one that `observe` made of this sample: a law predicts it there anyway.
+        What was expected may use the power that was applied meanwhile, for that is no merit of
+        the law, but nothing of the reading itself.
         """
         ...
 

@@ -23,6 +23,7 @@ class Mind:
         self.controller = controller
         self.name = controller.name
         self.belief: Any = controller.start()
+        self._seen: Situation | None = None
         self._foretells = controller if isinstance(controller, Foretelling) else None
         self.remembers = controller if isinstance(controller, Remembering) else None
 
@@ -34,14 +35,18 @@ class Mind:
         return True
 
     def surprise_k(self, situation: Situation) -> float:
-        """Return reading minus what was expected, asked before `observe`; or NaN."""
-        if self._foretells is None:
+        """Return reading minus what was expected, asked after `observe`; or NaN.
+
+        A law that failed to observe this sample would answer for an earlier one.
+        """
+        if self._foretells is None or self._seen is not situation:
             return math.nan
         return self._foretells.surprise_k(self.belief, situation)
 
     def observe(self, situation: Situation) -> None:
         """Show the controller a sample, whether it is in charge or not."""
         self.belief = self.controller.observe(self.belief, situation)
+        self._seen = situation
 
     def decide(self, situation: Situation) -> object:
         """Return what the controller asks for, of whatever kind."""

@@ -200,8 +200,8 @@ class Regulator:
         self._learning.hold(temperature_c - self._wishes.setpoint_c, applied, seen_s)
         reference = self._wishes.approach(temperature_c, seen_s, self._supervisor.state)
         situation = self._learning.situation(t_s, interval_s, temperature_c, reference, applied)
-        self._shadow.observe(situation, self._steering.mind)
         self._steering.observe(situation)
+        self._shadow.observe(situation, self._steering.mind)
         beliefs = self._steering.beliefs(situation, self._learning.beliefs(t_s))
         self._jump_k = self._jump_for(beliefs)
         if self._feasibility.observe(interval_s, applied, temperature_c, beliefs.lag_s):

@@ -71,18 +71,18 @@ class Shadow:
         self._power, self._tally = None, Tally()
 
     def observe(self, situation: Situation, charge: Mind) -> None:
-        """Show it the sample, before `charge` sees it; note how surprised both are."""
+        """Show it the sample, after `charge` has seen it; note how surprised both were."""
         mind = self._mind
         if mind is None:
             return
-        of_charge = attempt(charge.surprise_k, situation)  # a score costs no heat
-        of_shadow = attempt(mind.surprise_k, situation)
         seen = attempt(mind.observe, situation)
+        of_shadow = attempt(mind.surprise_k, situation)
+        of_charge = attempt(charge.surprise_k, situation)  # a score costs no heat
         self._surprises_k = (_number(of_charge), _number(of_shadow))
-        if isinstance(of_shadow, Failure):
-            self._drop(of_shadow)
-        elif isinstance(seen, Failure):
+        if isinstance(seen, Failure):
             self._drop(seen)
+        elif isinstance(of_shadow, Failure):
+            self._drop(of_shadow)
 
     def decide(self, situation: Situation, given: float, seen_s: float, *, steered: bool) -> None:
         """Ask it for the power of this sample, and compare that with what is given.

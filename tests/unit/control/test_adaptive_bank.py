@@ -127,6 +127,15 @@ def test_whatever_finite_readings_come_a_power_follows(samples, period_s):
     assert (belief.outlook is None) == (not any(math.isfinite(y) for y, _ in samples))
 
 
+def test_heat_under_way_is_what_dead_time_and_heater_hold_however_long_it_was_added_up():
+    h, rng = BANK.hypotheses, np.random.default_rng(6)
+    way = path_room.at_rest(h)
+    for power in rng.random(5000):
+        way = path_room.pushed(way, h, power)
+    waiting = np.array([way.powers[:dead].sum() for dead in h.dead])
+    assert way.under_way == pytest.approx(waiting + h.element * way.heat, abs=1e-10)
+
+
 # -- readings -------------------------------------------------------------------------------------
 
 
@@ -223,7 +232,7 @@ def test_the_loss_may_drift_faster_while_the_power_is_far_from_what_holds_the_wa
     h, block = BANK.hypotheses, filters.start(BANK.hypotheses, 25.0)
     heat = np.zeros(len(h))
     calm, restless = (
-        filters.predicted(block, heat, h, BANK.drift, unrest)[D, D] - block[D, D]
+        filters.predicted(block, heat, BANK.constants, unrest)[D, D] - block[D, D]
         for unrest in (0.0, 0.8)
     )
     assert restless / calm == pytest.approx(np.full(len(h), (1.0 + filters.UNREST * 0.8) ** 2))
@@ -303,7 +312,7 @@ def test_a_wrong_hypothesis_at_the_floor_comes_back_when_it_is_right():
         log=np.where(slow, 0.0, -30.0), share=slow / slow.sum(), likeliest=int(slow.argmax())
     )
     assert belief.outlook.lag_s < 30.0
-    misled, other = replace(belief, weights=weights), belief
+    misled, other = belief._replace(weights=weights), belief
     water = sensor = float(belief.block[Z, X, belief.weights.likeliest])
     q = 0.3
     for k in range(120):
@@ -426,7 +435,8 @@ def test_the_spread_is_that_of_the_coasting_temperatures():
     belief, _ = warmed(40)
     h, x, path = BANK.hypotheses, belief.block[:, X], belief.path
     holding = np.clip(x[D] / x[BETA], 0.0, 1.0)
-    under_way = h.element * (path.heat - holding) + path.pending - h.dead * holding
+    pending = np.array([path.powers[:dead].sum() for dead in h.dead])
+    under_way = h.element * (path.heat - holding) + pending - h.dead * holding
     coasting = x[0] + x[BETA] * under_way
     spread = np.sqrt(np.cov(coasting, aweights=belief.weights.share, ddof=0))
     assert spread > 0.01
@@ -438,7 +448,7 @@ def test_within_a_period_heater_and_sensor_are_those_of_a_hundred_short_ones(per
     h, fine = Hypotheses.at_period(period_s), Hypotheses.at_period(period_s / 100.0)
     block = filters.start(h, 25.0)
     way = path_room.pushed(path_room.at_rest(h), replace(h, dead=np.zeros_like(h.dead)), 1.0)
-    water, sensor = filters.predicted(block, way.mean, h, BANK.drift)[:2, X] - 25.0
+    water, sensor = filters.predicted(block, way.mean, filters.constants(h, 0.0))[:2, X] - 25.0
     q, heat, shown = np.zeros((3, len(h)))
     for k in range(100):
         before, q = q, q + fine.element_step * (1.0 - q)

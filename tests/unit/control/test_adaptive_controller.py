@@ -1,7 +1,6 @@
 """The bank behind the port: time, power, words, and what it is not fooled by."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,8 +78,8 @@ def test_calmness_divides_the_power_an_error_is_met_with():
     outlook, path = belief.bank.outlook, belief.bank.path
     held = np.full_like(path.powers, outlook.holding_power)
     still = outlook._replace(surplus=0.0, spread_k=0.0)
-    bank = replace(belief.bank, path=path._replace(powers=held), outlook=still)
-    belief = replace(belief, bank=bank)
+    bank = belief.bank._replace(path=path._replace(powers=held), outlook=still)
+    belief = belief._replace(bank=bank)
     aims = []
     for calmness in (0.3, 0.6, 1.2):
         now = situation(37.5, 0.2, outlook.coasting_c + 0.02)
@@ -113,6 +112,21 @@ def test_samples_that_come_faster_than_the_period_give_their_mean_power():
     assert belief.bank.sample == before.bank.sample + 1
     assert belief.bank.path.powers[0] == pytest.approx((0.4 * 0.9 + 0.8 * 0.3) / 1.2)
     assert belief.behind_s == pytest.approx(0.2)
+
+
+def test_a_reading_is_compared_with_what_was_foreseen_a_period_before_and_no_other_time():
+    law = Adaptive()
+    before, _ = steered(law, Vessel(), 200)
+    cooler = Adaptive(action="cool")
+    seen = law.observe(before, situation(31.0, 0.7))
+    assert law.surprise_k(seen, situation(31.0, 0.7)) == seen.bank.surprise_k
+    assert cooler.observe(before, situation(-31.0, 0.7)).surprise_k == -seen.bank.surprise_k
+    unseen = law.observe(before, situation(math.nan, 0.7))
+    early = law.observe(before, situation(31.0, 0.7, interval_s=0.4))
+    gathered = law.observe(early, situation(31.0, 0.7, interval_s=0.8))
+    late, lost = (law.observe(before, situation(31.0, 0.7, interval_s=s)) for s in (3.0, 100.0))
+    for belief in (law.start(), unseen, early, gathered, late, lost):
+        assert math.isnan(belief.surprise_k)
 
 
 def test_jitter_of_the_clock_adds_and_loses_no_period():
@@ -200,7 +214,7 @@ def test_it_rides_for_three_lags_but_no_longer_than_a_minute():
     slow = belief.bank.outlook._replace(lag_s=40.0)
     fast = belief.bank.outlook._replace(lag_s=5.0)
     for outlook, ride_s in ((slow, 60.0), (fast, 15.0)):
-        assert law.ride_s(replace(belief, bank=replace(belief.bank, outlook=outlook))) == ride_s
+        assert law.ride_s(belief._replace(bank=belief.bank._replace(outlook=outlook))) == ride_s
 
 
 @pytest.mark.parametrize("gain", [-0.036, 0.0])

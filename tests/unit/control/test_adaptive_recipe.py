@@ -111,6 +111,9 @@ class PlainBank:
         away = abs(u - self.told[0]) if self.k > 0 else 0.0
         for each in self.filters:
             each.predict(away, self.k * self.h)
+        w = np.exp([each.ln_w for each in self.filters])
+        expected = w @ [each.x[1] for each in self.filters] / w.sum()
+        self.surprise = y - expected if self.k > 0 else math.nan
         if valid:
             self.meet(y, e, away)
         return self.decide(r)
@@ -252,6 +255,7 @@ def test_every_step_is_that_of_filters_run_one_by_one(h, u_min, samples):
         told = (belief.outlook.holding_power, belief.outlook.coasting_c, belief.outlook.lag_s,
                 belief.outlook.gain, belief.outlook.heater_k, belief.outlook.surplus)  # fmt: skip
         largest = max(largest, abs(u - expected), *np.abs(np.subtract(told, plain.told)))
+        assert belief.surprise_k == pytest.approx(plain.surprise, abs=1e-9, nan_ok=True)
         per_period = np.array([1.0, 1.0, h, h])
         P = np.array([each.P * np.outer(per_period, per_period) for each in plain.filters])
         x = np.array([each.x * per_period for each in plain.filters])

@@ -274,9 +274,14 @@ def test_a_block_is_as_many_periods_as_come_next_to_its_length(period_s):
 # -- words ----------------------------------------------------------------------------------------
 
 
+def surprise_k(law, belief, now):
+    """Return by how much the reading of `now` surprised `law`."""
+    return law.surprise_k(law.observe(belief, now), now)
+
+
 def test_what_is_expected_counts_the_power_that_was_applied_meanwhile(settled):
     belief, law = settled[0], SelfTuningGpc()
-    cold, hot = (law.surprise_k(belief, situation(37.5, power)) for power in (0.0, 1.0))
+    cold, hot = (surprise_k(law, belief, situation(37.5, power)) for power in (0.0, 1.0))
     b1 = belief.learnt.theta[2]
     assert cold - hot == pytest.approx(b1 / 10.0 * 11.0 / 20.0)  # its tenth, at the end of a block
 
@@ -287,13 +292,19 @@ def test_it_says_by_how_much_a_reading_surprised_it(settled):
     vessel.sensor_c = vessel.water_c
     for _ in range(200):
         now = situation(vessel.reading(power), power)
-        surprises.append(law.surprise_k(belief, now))
         belief = law.observe(belief, now)
+        surprises.append(law.surprise_k(belief, now))
     assert np.std(surprises[60:]) == pytest.approx(0.005, rel=0.25)
-    assert math.isnan(law.surprise_k(law.start(), situation(37.5, power)))
-    assert math.isnan(law.surprise_k(belief, situation(37.5, power, interval_s=2.0)))
-    above = law.surprise_k(belief, situation(40.0, power))
+    assert math.isnan(surprise_k(law, law.start(), situation(37.5, power)))
+    above = surprise_k(law, belief, situation(40.0, power))
     assert above == pytest.approx(2.5, abs=0.1)
+
+
+@pytest.mark.parametrize("interval_s", [0.4, 2.0, 100.0])
+def test_it_foretells_one_period_and_no_other_time(settled, interval_s):
+    belief, power = settled
+    now = situation(37.5, power, interval_s=interval_s)
+    assert math.isnan(surprise_k(SelfTuningGpc(), belief, now))
 
 
 @pytest.mark.parametrize(

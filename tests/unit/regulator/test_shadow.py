@@ -12,6 +12,7 @@ from thermoctl.app.settings import load
 from thermoctl.errors import ConfigError, Refused
 from thermoctl.ports import Situation
 from thermoctl.regulator import Regulator
+from thermoctl.regulator.mind import Mind
 from thermoctl.signals import (
     Beliefs,
     ChooseController,
@@ -154,6 +155,13 @@ def test_that_nobody_can_score_the_one_in_charge_costs_no_power():
     assert {(step.state, step.command.power) for step in steps} == {(State.RUN, 0.3)}
     assert steps[-1].shadow_score.surprise_k is None
     assert steps[-1].shadow_score.shadow_surprise_k == pytest.approx(0.2)
+
+
+def test_a_law_that_did_not_see_a_sample_is_not_asked_how_it_was_surprised():
+    mind = Mind(Rival(surprise=0.4))
+    mind.observe(SITUATION)
+    assert mind.surprise_k(SITUATION) == 0.4
+    assert math.isnan(mind.surprise_k(replace(SITUATION, t_s=1.0)))
 
 
 def test_the_two_change_places_on_request_and_back():
@@ -325,12 +333,9 @@ def test_the_pole_of_the_simple_model_is_told_beside_every_controller(drive_with
 def test_the_default_foretells_one_period_and_no_other_time(drive_with, interval_s, told):
     drive = drive_with(controller="adaptive")
     drive.run(120)
-    mind = drive.regulator._steering.mind
-    belief = mind.belief
-    drive.t_s += interval_s - 1.0
-    drive.step()
+    law, belief = drive.regulator._steering.mind.controller, drive.regulator._steering.mind.belief
     situation = replace(SITUATION, interval_s=interval_s, measured_c=drive.water_c)
-    assert math.isfinite(mind.controller.surprise_k(belief, situation)) is told
+    assert math.isfinite(law.surprise_k(law.observe(belief, situation), situation)) is told
 
 
 def test_the_model_of_a_sample_that_was_not_used_foretells_nothing():

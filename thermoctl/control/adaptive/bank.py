@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -43,8 +43,7 @@ BLIND_S = 300.0
 nothing of the water any more. Gain, loss and weights are kept, water and sensor begin anew."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BankBelief:
+class BankBelief(NamedTuple):
     """What the bank believes after a sample.
 
     Parameters
@@ -63,6 +62,9 @@ class BankBelief:
         Whether the water drifts by itself.
     heard : float
         What the last sample counted as evidence for or against them, in [0, 1].
+    surprise_k : float
+        The last reading less what the hypotheses expected, weighted as they were before it; NaN
+        where there was no reading, or nothing to expect.
     block : ndarray, shape (4, 5, n) or None
         The filters; None before the first valid reading.
     outlook : Outlook or None
@@ -80,9 +82,29 @@ class BankBelief:
     weights: Weights
     drifting: Drifting
     heard: float = 0.0
+    surprise_k: float = math.nan
     block: filters.Block | None = None
     outlook: Outlook | None = None
     prior: filters.Prior = filters.UNKNOWN
+
+
+class Ahead(NamedTuple):
+    """What a period makes of a belief before the reading at its end is seen.
+
+    Parameters
+    ----------
+    excitation, path : Excitation, Path
+        As in the belief to come.
+    unrest : float
+        How far the power was from what holds the water; 0 while that is not known.
+    block : ndarray, shape (4, 5, n) or None
+        The filters; None where nothing is foreseen, at the start or after a long gap.
+    """
+
+    excitation: Excitation
+    path: Path
+    unrest: float
+    block: filters.Block | None
 
 
 class Met(NamedTuple):
@@ -93,6 +115,7 @@ class Met(NamedTuple):
     weights: Weights
     drifting: Drifting
     heard: float
+    surprise_k: float
     block: filters.Block
 
 
@@ -117,7 +140,7 @@ class Bank:
     u_min: float = 0.0
     u_max: float = 1.0
     hypotheses: Hypotheses = field(init=False, repr=False)
-    drift: filters.Drift = field(init=False, repr=False)
+    constants: filters.Constants = field(init=False, repr=False)
     _arrivals: Mapping[int, Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -129,7 +152,7 @@ class Bank:
         if self.u_max <= 0.0:
             raise ValueError(f"u_max must be positive, got {self.u_max!r}")
         object.__setattr__(self, "hypotheses", Hypotheses.at_period(self.period_s))
-        object.__setattr__(self, "drift", filters.drift(self.period_s))
+        object.__setattr__(self, "constants", filters.constants(self.hypotheses, self.u_min))
         object.__setattr__(self, "_arrivals", _arrivals(self.hypotheses))
 
     @property
@@ -167,98 +190,109 @@ class Bank:
         ArithmeticError
             The result would not be finite; `belief` is still good.
         """
-        hypotheses, bounds = self.hypotheses, (self.u_min, self.u_max)
-        power = clamp(applied, *bounds)
-        way = path.pushed(belief.path, hypotheses, power)
+        return self.met(belief, self.ahead(belief, applied), y_c)
+
+    def ahead(self, belief: BankBelief, applied: float) -> Ahead:
+        """Return what a period of `applied` makes of `belief`, whatever will be read."""
+        power = clamp(applied, self.u_min, self.u_max)
+        way = path.pushed(belief.path, self.hypotheses, power)
         excitation = belief.excitation.after(power, self.period_s)
-        seen = math.isfinite(y_c)
+        outlook, block = belief.outlook, belief.block
+        unrest = 0.0 if outlook is None else abs(power - outlook.holding_power)
+        if block is not None and belief.blind * self.period_s <= BLIND_S:
+            block = self._predicted(block, way, belief.sample + 1, unrest)
+        else:
+            block = None
+        return Ahead(excitation, way, unrest, block)
+
+    def met(self, belief: BankBelief, ahead: Ahead, y_c: float) -> BankBelief:
+        """Return the belief after the reading `y_c` at the end of the period `ahead`.
+
+        Raises
+        ------
+        ArithmeticError
+            The result would not be finite; `belief` is still good.
+        """
+        seen, way = math.isfinite(y_c), ahead.path
         if belief.block is None and not seen:
-            return replace(belief, path=way, excitation=excitation)
-        sample, blind = belief.sample + 1, 0 if seen else belief.blind + 1
-        block, unrest = self._begun(belief, y_c), _unrest(belief.outlook, power)
-        if blind * self.period_s <= BLIND_S:
-            block = self._ahead(block, way, sample, unrest)
-        met = Met(belief.noise, belief.gate, belief.weights, belief.drifting, 0.0, block)
-        if seen:
-            met = self._met(met, y_c, sample, excitation.share, unrest)
-        ahead = outlook(met.block, way, met.weights.share, hypotheses, bounds)
-        if not math.isfinite(np.vdot(met.block, met.block) + ahead.coasting_c):
-            raise ArithmeticError(f"expected a finite belief after {y_c!r} degC at {applied!r}")
+            return belief._replace(path=way, excitation=ahead.excitation)
+        met = self._seen(belief, ahead, y_c) if seen else self._unseen(belief, ahead)
+        view = outlook(met.block, way, met.weights.share, self.hypotheses, self.bounds)
+        if not math.isfinite(np.vdot(met.block, met.block) + view.coasting_c):
+            raise ArithmeticError(f"expected a finite belief after {y_c!r} degC")
         for array in (met.block, *way):
             array.setflags(write=False)
-        return BankBelief(sample, blind, excitation, way, *met, ahead)
-
-    def foreseen(self, block: filters.Block, belief: BankBelief, applied: float) -> filters.Block:
-        """Return `block`, that of `belief`, as it will be after a period of `applied`."""
-        power = clamp(applied, *self.bounds)
-        way = path.pushed(belief.path, self.hypotheses, power)
-        unrest = _unrest(belief.outlook, power)
-        return filters.predicted(block, way.mean, self.hypotheses, self.drift, unrest)
+        blind = 0 if seen else belief.blind + 1
+        return BankBelief(belief.sample + 1, blind, ahead.excitation, way, *met, view)
 
     def lost(self, belief: BankBelief) -> BankBelief:
         """Return the belief after a gap of which the applied power is not known."""
         blind = max(belief.blind, math.ceil(BLIND_S / self.period_s)) + 1
-        return replace(belief, blind=blind, gate=Gate(), path=path.at_rest(self.hypotheses))
+        return belief._replace(blind=blind, gate=Gate(), path=path.at_rest(self.hypotheses))
 
-    def _begun(self, belief: BankBelief, y_c: float) -> filters.Block:
-        """Return the block to go on from; at the first reading and after a long gap, a new one."""
-        if belief.block is None:
-            return filters.start(self.hypotheses, y_c, belief.prior)
-        if belief.blind * self.period_s > BLIND_S and math.isfinite(y_c):
-            return filters.restarted(belief.block, self.hypotheses, y_c)
-        return belief.block
-
-    def _ahead(self, block: filters.Block, way: Path, sample: int, unrest: float) -> filters.Block:
+    def _predicted(
+        self, block: filters.Block, way: Path, sample: int, unrest: float
+    ) -> filters.Block:
         """Return the block predicted for `sample`."""
-        block = filters.predicted(block, way.mean, self.hypotheses, self.drift, unrest)
+        block = filters.predicted(block, way.mean, self.constants, unrest)
         arrived = self._arrivals.get(sample)
         if arrived is not None:
             filters.loosened(block, way.heat, arrived)
         return block
 
-    def _met(self, before: Met, y_c: float, sample: int, share: float, unrest: float) -> Met:
+    def _begun(self, belief: BankBelief, ahead: Ahead, y_c: float) -> filters.Block:
+        """Return the block where nothing was foreseen: the first, or the first after a gap."""
+        if belief.block is None:
+            block = filters.start(self.hypotheses, y_c, belief.prior)
+        else:
+            block = filters.restarted(belief.block, self.hypotheses, y_c)
+        return self._predicted(block, ahead.path, belief.sample + 1, ahead.unrest)
+
+    def _unseen(self, belief: BankBelief, ahead: Ahead) -> Met:
+        """Return what becomes of the prediction without a reading: for some time, the belief."""
+        _, blind, _, _, noise, gate, weights, drifting, *_ = belief
+        stands = (blind + 1) * self.period_s > BLIND_S
+        block = belief.block if stands or ahead.block is None else ahead.block
+        assert block is not None
+        return Met(noise, gate, weights, drifting, 0.0, math.nan, block)
+
+    def _seen(self, belief: BankBelief, ahead: Ahead, y_c: float) -> Met:
         """Return what becomes of the prediction when the reading `y_c` meets it."""
-        noise, gate, weights, drifting, heard, block = before
-        noise = noise.after(y_c)
+        sample, share, heard = belief.sample + 1, ahead.excitation.share, 0.0
+        weights, drifting, noise = belief.weights, belief.drifting, belief.noise.after(y_c)
+        block, surprise_k = ahead.block, math.nan
+        if block is None:
+            block = self._begun(belief, ahead, y_c)
+        else:
+            surprise_k = y_c - float(weights.share.dot(block[Z, X]))
         R, m = noise.believed, weights.likeliest
         nu, S_m = y_c - float(block[Z, X, m]), float(block[Z, Z, m]) + R
         lag = float(self.hypotheses.lag_s[m]) / self.period_s
-        if before.noise.samples >= GATE_SAMPLES and nu * nu > GATE * S_m:
-            gate = gate.beyond(sample, HOLD_LAGS * lag)
-        else:
-            gate = gate.within()
+        outside = belief.noise.samples >= GATE_SAMPLES and nu * nu > GATE * S_m
+        gate = belief.gate.beyond(sample, HOLD_LAGS * lag) if outside else belief.gate.within()
         if gate.outlier:
-            return Met(noise, gate, weights, drifting, heard, block)
+            return Met(noise, gate, weights, drifting, heard, surprise_k, block)
         if sample >= drifting.silent_until:
-            still, rest = (
-                share == 0.0 and unrest < QUIET_POWER,
-                max(QUIET_LAGS * lag, QUIET_SAMPLES),
-            )
+            still = share == 0.0 and ahead.unrest < QUIET_POWER
+            rest = max(QUIET_LAGS * lag, QUIET_SAMPLES)
             drifting = drifting.after(still, nu / math.sqrt(S_m), rest)
         if gate.jumped:
             block = filters.inflated(block, nu, R)
             drifting = Drifting(silent_until=gate.silent_until, disturbed=True)
         elif drifting.found:
-            filters.reopened(block)
+            block = filters.reopened(block)
             drifting = Drifting(silent_until=sample + HOLD_LAGS * lag, disturbed=True)
-        block, nus, S = filters.corrected(block, y_c, R, share)
-        filters.project(
-            block, self.hypotheses, self.u_min, loss=sample * self.period_s > LOSS_FROM_S
-        )
+        block, nis, S = filters.corrected(block, y_c, R, share)
+        filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
         silent_until = max(EVIDENCE_FROM, gate.silent_until, drifting.silent_until)
         if share > 0.0 and sample >= silent_until and not drifting.suspected:
-            weights, heard = weights.after(share, nus, S), share
+            weights, heard = weights.after(share, nis, S), share
         elif sample < gate.silent_until and not gate.jumped:
-            weights = weights.among_shapes(nus, S)
-        return Met(noise, gate, weights, drifting, heard, block)
+            weights = weights.among_shapes(nis, S)
+        return Met(noise, gate, weights, drifting, heard, surprise_k, block)
 
 
 def _arrivals(hypotheses: Hypotheses) -> Mapping[int, Array]:
     """Return, by sample, under which hypotheses the heat has just arrived."""
     samples = np.floor(filters.LOSS_LAGS * hypotheses.lag_s / hypotheses.period_s) + 1.0
     return {int(sample): samples == sample for sample in np.unique(samples)}
-
-
-def _unrest(outlook: Outlook | None, power: float) -> float:
-    """Return how far `power` was from what holds the water; 0 while that is not known."""
-    return 0.0 if outlook is None else abs(power - outlook.holding_power)

@@ -102,29 +102,24 @@ def outlook(
     block: Block, path: Path, share: Array, hypotheses: Hypotheses, bounds: tuple[float, float]
 ) -> Outlook:
     """Return the weighted means; `bounds` are the least and the most power."""
-    x = block[:, X]
-    beta = x[BETA]
-    means = np.empty((8, len(share)))
-    coasting, holding, _, _, heater, surplus, squares, _ = means
-    np.divide(x[D], beta, out=holding)
-    np.maximum(holding, bounds[0], out=holding)
-    np.minimum(holding, bounds[1], out=holding)
-    np.subtract(path.heat, holding, out=surplus)
-    np.multiply(surplus, hypotheses.element, out=coasting)
-    coasting += path.pending
-    coasting -= hypotheses.dead_periods * holding
+    h, x = hypotheses.period_s, block[:, X]
+    beta, mean = x[BETA], share.dot
+    holding = np.minimum(np.maximum(x[D] / beta, bounds[0]), bounds[1])
+    coasting = path.under_way - hypotheses.held * holding
     coasting *= beta
     coasting += x[T]
-    means[2] = hypotheses.lag_s
-    means[3] = beta
-    np.multiply(hypotheses.element, beta, out=heater)
-    np.multiply(coasting, coasting, out=squares)
-    means[7] = block[BETA, BETA]
-    coasting_c, *others, square, variance = means.dot(share).tolist()
-    holding_power, lag_s, gain, heater_k, away = others
-    spread_k = math.sqrt(max(square - coasting_c * coasting_c, 0.0))
-    rate, rate_sd = gain / hypotheses.period_s, math.sqrt(variance) / hypotheses.period_s
-    return Outlook(coasting_c, holding_power, lag_s, rate, heater_k, away, spread_k, rate_sd)
+    coasting_c, holding_power = float(mean(coasting)), float(mean(holding))
+    coasting *= coasting
+    return Outlook(
+        coasting_c,
+        holding_power,
+        lag_s=float(mean(hypotheses.lag_s)),
+        gain=float(mean(beta)) / h,
+        heater_k=float(mean(hypotheses.element * beta)),
+        surplus=float(mean(path.heat)) - holding_power,
+        spread_k=math.sqrt(max(float(mean(coasting)) - coasting_c * coasting_c, 0.0)),
+        gain_sd=math.sqrt(float(mean(block[BETA, BETA]))) / h,
+    )
 
 
 def power_for(

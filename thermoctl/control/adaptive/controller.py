@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 from thermoctl.control.adaptive import trial
 from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.coasting import Outlook, ahead, power_for
-from thermoctl.control.adaptive.filters import GAIN_MIN, X, Z
+from thermoctl.control.adaptive.filters import GAIN_MIN
 from thermoctl.control.adaptive.plant_belief import (
     gain,
     holding_power_sd,
@@ -48,8 +48,7 @@ class Sds(NamedTuple):
     holding_power: float = math.inf
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class AdaptiveBelief:
+class AdaptiveBelief(NamedTuple):
     """What the controller remembers.
 
     Parameters
@@ -66,15 +65,18 @@ class AdaptiveBelief:
         What has become of a model that was remembered from an earlier run.
     sds : Sds
         How well gain and holding power were known, at most `SDS_EVERY` samples ago.
+    surprise_k : float
+        This reading less what was expected of it; NaN: not known, or not of one period.
     """
 
     bank: BankBelief
     behind_s: float = 0.0
     since_s: float = 0.0
     given_s: float = 0.0
-    doubt: Lasting = field(default_factory=Lasting)
-    memory: Memory = field(default_factory=Memory)
-    sds: Sds = field(default_factory=Sds)
+    doubt: Lasting = Lasting()
+    memory: Memory = Memory()
+    sds: Sds = Sds()
+    surprise_k: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +158,7 @@ class Adaptive:
         if remembered.get("action") != self.action:
             raise ValueError(f"expected action {self.action!r}, got {remembered.get('action')!r}")
         bank = recalled(self.bank, remembered, age_s)
-        rival = replace(self.bank.start(), noise=bank.noise)
+        rival = self.bank.start()._replace(noise=bank.noise)
         return AdaptiveBelief(bank, memory=Memory(rival))
 
     def remember(self, belief: AdaptiveBelief) -> Mapping[str, Any] | None:
@@ -176,12 +178,11 @@ class Adaptive:
         behind_s, since_s = belief.behind_s + interval_s, belief.since_s + interval_s
         applied = self._heat(situation.applied)
         given_s = belief.given_s + applied * interval_s
-        bank, memory = belief.bank, belief.memory
-        power = given_s / since_s if belief.since_s > 0.0 else applied
-        reading_c = self._sign * situation.measured_c
+        bank, memory, gathered = belief.bank, belief.memory, belief.since_s > 0.0
+        power = given_s / since_s if gathered else applied
         if interval_s > max(UNKNOWN_S, UNKNOWN_PERIODS * h):
             bank, memory = trial.lost(self.bank, bank, memory)
-            behind_s, power = h, 0.0
+            behind_s, power, gathered = h, 0.0, True
         periods = math.floor(behind_s / h + 0.5)
         if periods < 1:
             return AdaptiveBelief(
@@ -189,11 +190,14 @@ class Adaptive:
             )
         for _ in range(periods - 1):
             bank, memory = trial.met(self.bank, bank, memory, math.nan, power)
-        bank, memory = trial.met(self.bank, bank, memory, reading_c, power)
+        sign = self._sign
+        bank, memory = trial.met(self.bank, bank, memory, sign * situation.measured_c, power)
         doubt = belief.doubt.after(_doubt(bank.outlook))
         due = bank.block is not None and bank.sample % SDS_EVERY == 0
         sds = self._sds(bank, memory) if due else belief.sds
-        return AdaptiveBelief(bank, behind_s - periods * h, doubt=doubt, memory=memory, sds=sds)
+        surprise_k = math.nan if gathered or periods > 1 else sign * bank.surprise_k
+        behind_s -= periods * h
+        return AdaptiveBelief(bank, behind_s, 0.0, 0.0, doubt, memory, sds, surprise_k)
 
     def _sds(self, bank: BankBelief, memory: Memory) -> Sds:
         """Return how well gain and holding power are known; on trial no better than when new."""
@@ -219,13 +223,7 @@ class Adaptive:
 
     def surprise_k(self, belief: AdaptiveBelief, situation: Situation) -> float:
         """Return reading minus what the hypotheses expected; NaN beyond one period."""
-        bank = belief.bank
-        periods = (belief.behind_s + situation.interval_s) / self.period_s
-        if bank.block is None or belief.since_s > 0.0 or not 0.5 <= periods < 1.5:
-            return math.nan
-        applied = self._heat(situation.applied)
-        expected = self.bank.foreseen(bank.block, bank, applied)[Z, X]
-        return self._sign * situation.measured_c - float(bank.weights.share.dot(expected))
+        return belief.surprise_k
 
     def beliefs(self, belief: AdaptiveBelief, situation: Situation) -> Beliefs:
         """Return gain with its error, lag, and holding power once it is known to .05."""

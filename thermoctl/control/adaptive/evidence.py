@@ -220,18 +220,26 @@ class Weights(NamedTuple):
     share: Array
     likeliest: int
 
-    def after(self, e: float, nu: Array, S: Array) -> Weights:
-        """Return the weights after innovations `nu` of variances `S`, counted as `e`."""
-        log = _likelihood(nu, S, e)
+    def after(self, e: float, nis: Array, S: Array) -> Weights:
+        """Return the weights after a reading, counted as `e`.
+
+        Parameters
+        ----------
+        e : float
+            What it proves, in [0, 1].
+        nis, S : ndarray, shape (n,)
+            The innovations squared over their variances, and these.
+        """
+        log = _likelihood(nis, S, e)
         log += self.log  # ALF (6)-(7), in logarithms
         return weighted(log)
 
-    def among_shapes(self, nu: Array, S: Array) -> Weights:
+    def among_shapes(self, nis: Array, S: Array) -> Weights:
         """Return the weights after innovations that speak of shapes alone.
 
         Of each lag all shapes together keep the weight they had.
         """
-        log, before = _likelihood(nu, S, 1.0).reshape(LAGS, -1), self.share.reshape(LAGS, -1)
+        log, before = _likelihood(nis, S, 1.0).reshape(LAGS, -1), self.share.reshape(LAGS, -1)
         log -= log.max(axis=1, keepdims=True)
         after = before * np.exp(log)
         log += np.log(before.sum(axis=1, keepdims=True) / after.sum(axis=1, keepdims=True))
@@ -240,12 +248,10 @@ class Weights(NamedTuple):
         return weighted(each)
 
 
-def _likelihood(nu: Array, S: Array, e: float) -> Array:
-    """Return `e` times the log likelihood of innovations `nu` of variances `S`; no constants."""
-    log = nu * nu
-    log /= S
-    np.minimum(log, SURPRISE_MAX, out=log)
-    log += np.log(S)
+def _likelihood(nis: Array, S: Array, e: float) -> Array:
+    """Return `e` times the log likelihood, without constants; `nis` is nu^2 / S."""
+    log = np.log(S)
+    log += np.minimum(nis, SURPRISE_MAX)
     log *= -0.5 * e
     return log
 

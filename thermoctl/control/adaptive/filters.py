@@ -2,7 +2,8 @@ r"""A Kalman filter for every hypothesis, all in one array.
 
 The state is :math:`x = (T, z, d, \beta)`: water and sensor in degC, loss and gain in K per period,
 without power and from full power. A block holds ``[P | x]``, shape (4, 5, n), so that what is done
-to the rows of P is done to x in the same breath. Every function but `project` returns a new one.
+to the rows of P is done to x in the same breath. `loosened` and `project` change the block they
+are given, all other functions return a new one.
 
 P is symmetric to the last bit, since each pair of elements is made by the same operations on equal
 numbers; no second pass is needed (``test_covariances_stay_symmetric_to_the_last_bit``).
@@ -77,34 +78,58 @@ UNKNOWN = Prior()
 """A plant never seen before."""
 
 
-class Drift(NamedTuple):
-    """Process noise of a period, as `drift` makes it.
+class Constants(NamedTuple):
+    """What is the same at every sample, as `constants` makes it; in K and periods.
+
+    Nearly all are arrays of the shape of what they meet. To stretch a number or a row would take
+    longer than the operation itself, as few as the hypotheses are.
 
     Parameters
     ----------
-    per_gain : ndarray, shape (4, 1)
-        Variances of the states over the square of the gain in K per period.
-    z : float
-        Variance of z.
-    gain_min : float
-        Least gain that is taken, in K per period.
+    step, soon : ndarray, shape (5, n)
+        `sensor_step` and `sensor_soon` of the hypotheses, for a row of a block.
+    noise_water, noise_loss, noise_gain : float
+        Variances of T, d and beta that a period adds, over the square of the gain.
+    noise_sensor : float
+        Variance of z that it adds.
+    gain_noisy : ndarray, shape (n,)
+        Least gain of which the noise is taken.
+    gain_min, gain_max, loss_min, loss_max : ndarray, shape (n,)
+        Limits of the gain, and those of the loss in gains.
     """
 
-    per_gain: Array
-    z: float
-    gain_min: float
+    step: Array
+    soon: Array
+    noise_water: float
+    noise_sensor: float
+    noise_loss: float
+    noise_gain: float
+    gain_noisy: Array
+    gain_min: Array
+    gain_max: Array
+    loss_min: Array
+    loss_max: Array
 
 
-def drift(period_s: float) -> Drift:
-    """Return diag((.08 b)^2, .003^2, (.0008 b)^2, (2e-4 b)^2) times the period.
+def constants(hypotheses: Hypotheses, u_min: float) -> Constants:
+    """Return the constants at the period of `hypotheses`, for a least power `u_min`.
 
-    The gain of a period, and the unit of d and beta, are h times those of a second.
+    Noise is diag((.08 b)^2, .003^2, (.0008 b)^2, (2e-4 b)^2) times the period h. The gain of a
+    period, and the unit of d and beta, are h times those of a second.
     """
-    shares = np.array([DRIFT_T / period_s, 0.0, DRIFT_D, DRIFT_BETA])
-    return Drift(
-        per_gain=(shares**2 * period_s)[:, None],
-        z=DRIFT_Z_K**2 * period_s,
-        gain_min=DRIFT_GAIN_MIN * period_s,
+    h, one = hypotheses.period_s, np.ones(len(hypotheses))
+    return Constants(
+        step=np.tile(hypotheses.sensor_step, (5, 1)),
+        soon=np.tile(hypotheses.sensor_soon, (5, 1)),
+        noise_water=DRIFT_T**2 / h,
+        noise_sensor=DRIFT_Z_K**2 * h,
+        noise_loss=DRIFT_D**2 * h,
+        noise_gain=DRIFT_BETA**2 * h,
+        gain_noisy=DRIFT_GAIN_MIN * h * one,
+        gain_min=GAIN_MIN * h * one,
+        gain_max=GAIN_MAX * h * one,
+        loss_min=(u_min - LOSS_MIN) * one,
+        loss_max=LOSS_MAX * one,
     )
 
 
@@ -126,9 +151,7 @@ def restarted(block: Block, hypotheses: Hypotheses, y_c: float) -> Block:
     return after
 
 
-def predicted(
-    block: Block, heat: Array, hypotheses: Hypotheses, drift: Drift, unrest: float = 0.0
-) -> Block:
+def predicted(block: Block, heat: Array, constants: Constants, unrest: float = 0.0) -> Block:
     """Return the block one period later.
 
     T' = T - d + beta q and z' = z + a (T - z) + c (T' - T), exact for water that warms evenly
@@ -136,20 +159,43 @@ def predicted(
     that knew of T alone would show nothing before the next one, and no hypothesis would fit.
     `unrest` is how far the power was from what holds the water.
     """
-    after = block.copy()
-    _move(after, heat, hypotheses)  # F [P | x]
-    _move(after[T], heat, hypotheses)  # F P F', row by row where both row and column move
-    _move(after[Z], heat, hypotheses)
-    after[D:, :D] = after[:D, D:X].swapaxes(0, 1)  # and by symmetry where one does
-    after[Z, T] = after[T, Z]  # the one pair whose two ways of rounding differ
-    b = np.maximum(block[BETA, X], drift.gain_min)
-    b *= b
-    noise = drift.per_gain * b
-    noise[D] *= (1.0 + UNREST * unrest) ** 2
-    noise[Z] = drift.z
-    diagonal = after.reshape(20, -1)[:19:6]  # elements (0, 0), (1, 1), (2, 2), (3, 3)
-    diagonal += noise
+    after, a, c = block.copy(), constants.step, constants.soon
+    water, sensor = after[T], after[Z]
+    towards = water - sensor
+    towards *= a
+    warming = block[BETA] * heat
+    warming -= block[D]
+    water += warming  # F [P | x]
+    sensor += towards
+    warming *= c
+    sensor += warming
+    TT, ZT, ZZ = water[T], sensor[T], sensor[Z]
+    towards = ZT - ZZ
+    towards *= a[Z]
+    warming = water[BETA] * heat
+    warming -= water[D]
+    TT += warming  # F P F', where row and column move
+    warming = sensor[BETA] * heat
+    warming -= sensor[D]
+    ZT += warming
+    ZZ += towards
+    warming *= c[Z]
+    ZZ += warming
+    after[T, Z] = ZT  # and by symmetry elsewhere
+    after[D:, :D] = after[:D, D:X].swapaxes(0, 1)
+    _drift(after, block[BETA, X], constants, unrest)
     return after
+
+
+def _drift(block: Block, gain: Array, constants: Constants, unrest: float) -> None:
+    """Add the noise of a period, in place."""
+    b2 = np.maximum(gain, constants.gain_noisy)
+    b2 *= b2
+    water, sensor, loss, beta = block[T, T], block[Z, Z], block[D, D], block[BETA, BETA]
+    water += constants.noise_water * b2
+    sensor += constants.noise_sensor
+    loss += constants.noise_loss * (1.0 + UNREST * unrest) ** 2 * b2
+    beta += constants.noise_gain * b2
 
 
 def loosened(block: Block, heat: Array, due: Array) -> None:
@@ -163,23 +209,12 @@ def loosened(block: Block, heat: Array, due: Array) -> None:
     block[D:, D:X] += spread * spread
 
 
-def reopened(block: Block) -> None:
-    """Make the loss uncertain, in place: the water drifts, so it is not what it was."""
+def reopened(block: Block) -> Block:
+    """Return the block with an uncertain loss: the water drifts, so it has changed."""
+    after = block.copy()
     spread = REOPENED * block[BETA, X]
-    block[D, D] += spread * spread
-
-
-def _move(rows: Block, heat: Array, hypotheses: Hypotheses) -> None:
-    """Multiply four rows by F from the left, in place; columns of P likewise by F'."""
-    water, sensor = rows[T], rows[Z]
-    towards = water - sensor
-    towards *= hypotheses.sensor_step
-    warming = rows[BETA] * heat
-    warming -= rows[D]
-    water += warming
-    sensor += towards
-    warming *= hypotheses.sensor_soon
-    sensor += warming
+    after[D, D] += spread * spread
+    return after
 
 
 def inflated(block: Block, nu: float, R: float) -> Block:
@@ -196,36 +231,36 @@ def inflated(block: Block, nu: float, R: float) -> Block:
 
 
 def corrected(block: Block, y_c: float, R: float, proof: float = 1.0) -> tuple[Block, Array, Array]:
-    """Return the block after reading `y_c`, the innovations and their variances.
+    """Return the block after reading `y_c`, the innovations squared over S, and S.
 
-    Where the gain beta is known, it is corrected by the share `proof` of what Kalman would: at 0 it
-    is *considered*, as Schmidt does, and not estimated. Its uncertainty counts in all else, and
-    what binds it to the rest is kept. In a closed loop at rest power follows the noise of the
-    reading, and a gain that is estimated there climbs for hours, surer at every step.
+    S are the variances of the innovations. Where the gain beta is known, it is corrected by the
+    share `proof` of what Kalman would: at 0 it is *considered*, as Schmidt does, and not estimated.
+    Its uncertainty counts in all else, and what binds it to the rest is kept. In a closed loop at
+    rest power follows the noise of the reading, and a gain that is estimated there climbs for
+    hours, surer at every step.
     """
-    S = block[Z, Z] + R
-    nu = y_c - block[Z, X]
-    root = np.sqrt(S)
-    g = block[Z] / root  # P H' / sqrt S, and beside it:
-    np.divide(nu, -root, out=g[X])
+    g = block[Z].copy()
+    nu = g[X]
+    nu -= y_c
+    S = g[Z] + R
+    g /= np.sqrt(S)  # P H' / sqrt S, and beside it -nu / sqrt S
     after = g[:X, None] * g
     if proof < 1.0:  # of beta K = p g / sqrt S: Joseph's form differs from P - g g' here alone
         most = KNOWN_SHARE * block[BETA, X]
         most *= most
-        gain, known = after[BETA], block[BETA, BETA] <= most
-        np.multiply(gain[X], proof, out=gain[X], where=known)
-        np.multiply(gain[BETA], proof * (2.0 - proof), out=gain[BETA], where=known)
+        known, P, x = block[BETA, BETA] <= most, after[BETA, BETA], after[BETA, X]
+        np.multiply(P, proof * (2.0 - proof), out=P, where=known)
+        np.multiply(x, proof, out=x, where=known)
     np.subtract(block, after, out=after)  # P - g g', x + g nu / sqrt S
-    return after, nu, S
+    return after, nu * nu, S
 
 
-def project(block: Block, hypotheses: Hypotheses, u_min: float, *, loss: bool) -> None:
+def project(block: Block, constants: Constants, *, loss: bool) -> None:
     """Limit gain, and `loss` too, of a new block to what a plant can have; in place."""
-    h = hypotheses.period_s
     beta = block[BETA, X]
-    np.maximum(beta, GAIN_MIN * h, out=beta)
-    np.minimum(beta, GAIN_MAX * h, out=beta)
+    np.maximum(beta, constants.gain_min, out=beta)
+    np.minimum(beta, constants.gain_max, out=beta)
     if loss:
         d = block[D, X]
-        np.maximum(d, (u_min - LOSS_MIN) * beta, out=d)
-        np.minimum(d, LOSS_MAX * beta, out=d)
+        np.maximum(d, constants.loss_min * beta, out=d)
+        np.minimum(d, constants.loss_max * beta, out=d)

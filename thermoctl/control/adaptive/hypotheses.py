@@ -39,10 +39,10 @@ class Hypotheses:
         Total lag L: dead time, heater and sensor together.
     dead : ndarray of int
         Dead time in whole periods.
-    dead_periods : ndarray
-        The same, to reckon with: integers would be converted at every sample.
     element : ndarray
         Time constant of the heater in periods.
+    held : ndarray
+        Periods for which power is under way, through dead time and heater.
     element_step, sensor_step : ndarray
         What heater and sensor make up of a step within a period, in (0, 1].
     element_late, sensor_soon : ndarray
@@ -53,8 +53,8 @@ class Hypotheses:
     period_s: float
     lag_s: Array
     dead: npt.NDArray[np.intp]
-    dead_periods: Array
     element: Array
+    held: Array
     element_step: Array
     sensor_step: Array
     element_late: Array
@@ -82,15 +82,15 @@ class Hypotheses:
         lags_s = SHORTEST_LAG_S * LONGEST_OVER_SHORTEST ** (np.arange(LAGS) / (LAGS - 1.0))
         lag_s = np.repeat(lags_s, len(SHAPES))
         dead_s, element_s, sensor_s = np.tile(np.array(SHAPES), (LAGS, 1)).T * lag_s
-        dead_periods = np.rint(dead_s / period_s)
+        dead = np.rint(dead_s / period_s)
         element, sensor = element_s / period_s, sensor_s / period_s
         element_step, sensor_step = -np.expm1(-1.0 / element), -np.expm1(-1.0 / sensor)
         return cls(
             period_s=float(period_s),
             lag_s=lag_s,
-            dead=dead_periods.astype(np.intp),
-            dead_periods=dead_periods,
+            dead=dead.astype(np.intp),
             element=element,
+            held=dead + element,
             element_step=element_step,
             sensor_step=sensor_step,
             element_late=element * element_step,

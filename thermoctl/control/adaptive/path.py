@@ -22,8 +22,8 @@ class Path(NamedTuple):
     ----------
     powers : ndarray, shape (longest dead time + 1,)
         Applied power of the past periods, newest first.
-    pending : ndarray, shape (n,)
-        Sum of the powers within the dead time, newest included: ``powers[:dead].sum()``.
+    under_way : ndarray, shape (n,)
+        Sum of what was applied less what has reached the water: what dead time and heater hold.
     heat : ndarray, shape (n,)
         Power q that reaches the water at the end of the last period.
     mean : ndarray, shape (n,)
@@ -31,15 +31,14 @@ class Path(NamedTuple):
     """
 
     powers: Array
-    pending: Array
+    under_way: Array
     heat: Array
     mean: Array
 
 
 def at_rest(hypotheses: Hypotheses) -> Path:
     """Return the path of a plant that never got any power."""
-    n = len(hypotheses)
-    return Path(np.zeros(int(hypotheses.dead.max()) + 1), *np.zeros((3, n)))
+    return Path(np.zeros(int(hypotheses.dead.max()) + 1), *np.zeros((3, len(hypotheses))))
 
 
 def pushed(path: Path, hypotheses: Hypotheses, power: float) -> Path:
@@ -47,12 +46,10 @@ def pushed(path: Path, hypotheses: Hypotheses, power: float) -> Path:
     powers = np.empty_like(path.powers)
     powers[0] = power
     powers[1:] = path.powers[:-1]
-    leaving = powers[hypotheses.dead]  # u[k-1-nd]
-    pending = power - leaving
-    pending += path.pending
-    owed = leaving - path.heat
-    mean = owed * hypotheses.element_late
-    np.subtract(leaving, mean, out=mean)
-    owed *= hypotheses.element_step
-    owed += path.heat
-    return Path(powers, pending, owed, mean)
+    entering = powers[hypotheses.dead]  # u[k-1-nd], into the heater
+    owed = entering - path.heat
+    mean = entering - owed * hypotheses.element_late
+    heat = path.heat + owed * hypotheses.element_step
+    under_way = path.under_way + power
+    under_way -= mean
+    return Path(powers, under_way, heat, mean)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -101,7 +100,7 @@ def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBel
         max(lost_sd, LOSS_SHARE * rate),
     )
     weights = weighted(np.maximum(WEIGHT_POWER * log, WEIGHT_FLOOR))
-    return replace(bank.start(), noise=Noise(variance), weights=weights, prior=prior)
+    return bank.start()._replace(noise=Noise(variance), weights=weights, prior=prior)
 
 
 def _hypotheses() -> dict[str, Any]:

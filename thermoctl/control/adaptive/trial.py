@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from thermoctl.control.adaptive.bank import Bank, BankBelief
+from thermoctl.control.adaptive.bank import Ahead, Bank, BankBelief
 from thermoctl.control.adaptive.evidence import EVIDENCE_FROM, GATE
 from thermoctl.control.adaptive.filters import X, Z
 
@@ -65,19 +65,18 @@ def met(
     law: Bank, bank: BankBelief, memory: Memory, y_c: float, applied: float
 ) -> tuple[BankBelief, Memory]:
     """Return bank and trial after a period of `applied` and the reading `y_c`."""
-    after, rival = law.observe(bank, y_c, applied), memory.rival
+    ahead, rival = law.ahead(bank, applied), memory.rival
+    after = law.met(bank, ahead, y_c)
     if rival is None:
         return after, memory
-    heard = 0.0
+    rivals = law.ahead(rival, applied)
+    odds, heard = memory.odds, 0.0
     if math.isfinite(y_c) and after.sample >= EVIDENCE_FROM:
         heard = after.excitation.share
-    odds = memory.odds
     if heard > 0.0:
-        told, rivals = (foretold(law, each, y_c, applied) for each in (bank, rival))
-        odds += heard * (told - rivals)
-    rival = law.observe(rival, y_c, applied)
+        odds += heard * (foretold(bank, ahead, y_c) - foretold(rival, rivals, y_c))
     heard_s = memory.heard_s + heard * law.period_s
-    return _judged(after, Memory(rival, odds, heard_s))
+    return _judged(after, Memory(law.met(rival, rivals, y_c), odds, heard_s))
 
 
 def lost(law: Bank, bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:
@@ -101,11 +100,11 @@ def _judged(bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:
     return bank, memory
 
 
-def foretold(law: Bank, belief: BankBelief, y_c: float, applied: float) -> float:
-    """Return the log likelihood of the reading `y_c`, before it is seen."""
-    if belief.block is None:
+def foretold(belief: BankBelief, ahead: Ahead, y_c: float) -> float:
+    """Return the log likelihood of `y_c` as foreseen; 0 where nothing was."""
+    block = ahead.block
+    if block is None:
         return 0.0
-    block = law.foreseen(belief.block, belief, applied)
     nu = y_c - block[Z, X]
     S = block[Z, Z] + belief.noise.believed
     log = belief.weights.log - 0.5 * (np.log(S) + np.minimum(nu * nu / S, GATE))

@@ -54,6 +54,8 @@ class GpcBelief:
         Whether power seems to warm nothing.
     trusted : float
         Mean power while there was no doubt.
+    before : tuple of Record and Learnt, or None
+        What was known a period before this sample; None where that was nothing, or not one period.
     """
 
     record: Record
@@ -63,6 +65,7 @@ class GpcBelief:
     since_s: float = 0.0
     doubt: Doubt = field(default_factory=Doubt)
     trusted: float = 0.0
+    before: tuple[Record, Learnt] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,14 +182,17 @@ class SelfTuningGpc:
         power = given_s / since_s if belief.since_s > 0.0 else situation.applied
         power = clamp(power, 0.0, 1.0)
         if interval_s > max(UNKNOWN_S, UNKNOWN_PERIODS * h):
-            return replace(belief, record=self._begun(reading_c, 0.0), behind_s=0.0)
+            return replace(belief, record=self._begun(reading_c, 0.0), behind_s=0.0, before=None)
         behind_s = belief.behind_s + interval_s
         periods = math.floor(behind_s / h + 0.5)
         if not belief.record.has_begun:
             return replace(belief, record=self._begun(reading_c, 0.0))
         if periods < 1:
-            return replace(belief, behind_s=behind_s, given_s=given_s, since_s=since_s)
-        belief = replace(belief, behind_s=behind_s - periods * h, given_s=0.0, since_s=0.0)
+            return replace(belief, behind_s=behind_s, given_s=given_s, since_s=since_s, before=None)
+        one = periods == 1 and belief.since_s == 0.0
+        before = (belief.record, belief.learnt) if one else None
+        behind_s -= periods * h
+        belief = replace(belief, behind_s=behind_s, given_s=0.0, since_s=0.0, before=before)
         for _ in range(periods - 1):
             belief = self._met(belief, math.nan, power)
         return self._met(belief, reading_c, power)
@@ -284,12 +290,9 @@ class SelfTuningGpc:
 
     def surprise_k(self, belief: GpcBelief, situation: Situation) -> float:
         """Return reading minus what the model expected; NaN beyond one period."""
-        record = belief.record
-        periods = (belief.behind_s + situation.interval_s) / self.period_s
-        if not record.has_begun or belief.since_s > 0.0 or not 0.5 <= periods < 1.5:
+        if belief.before is None:
             return math.nan
-        power = clamp(situation.applied, 0.0, 1.0)
-        expected_c = self._expected_c(record, belief.learnt, power)
+        expected_c = self._expected_c(*belief.before, clamp(situation.applied, 0.0, 1.0))
         return self._sign * (self._seen(situation).measured_c - expected_c)
 
     def beliefs(self, belief: GpcBelief, situation: Situation) -> Beliefs:
