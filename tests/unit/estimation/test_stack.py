@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermoctl.estimation import CorrectedKalman, start
+from thermoctl.estimation import CorrectedKalman, Guarded, start
 from thermoctl.estimation.stack import Stacked, stack
 from thermoctl.signals import Estimate
 
@@ -73,3 +73,22 @@ def test_a_refused_sample_leaves_the_belief_as_it_was():
     refused = LAW.update(belief, PHI, np.nan)
     assert refused.rejected
     assert_same(LAW.update(refused, PHI, Y), LAW.update(belief, PHI, Y))
+
+
+def test_a_stack_learns_what_the_estimate_in_it_learns_and_is_read_only():
+    belief = learned()
+    rows, innovation, innovation_var, _ = LAW.learn(stack(belief), PHI, Y)
+    after = LAW.update(belief, PHI, Y)
+    assert rows.tolist() == stack(after).tolist()
+    assert (innovation, innovation_var) == (after.innovation, after.innovation_var)
+    with pytest.raises(ValueError, match="read-only"):
+        rows[0] = 1.0
+    assert LAW.learn(stack(belief), PHI, np.nan) is None
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_the_stack_of_a_guarded_estimate_holds_the_covariance_that_was_capped(n):
+    belief = Guarded(LAW, covariance_max=0.5).update(start(n, 9.0), np.full(n, 0.1), 0.3)
+    assert belief.P.diagonal() == pytest.approx(np.full(n, 0.5))
+    assert stack(belief).tolist() == [belief.theta.tolist(), *belief.P.tolist()]
+    assert not belief.rows.flags.writeable
