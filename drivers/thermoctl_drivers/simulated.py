@@ -264,7 +264,7 @@ class SimulatedBoard:
         tank, heat = self._tank, self._tank.heat
         temperatures = tank.temperatures
         return {
-            "true_temperature_c": tank.temperature_c,
+            "true_temperature_c": temperatures.bulk_c,
             "sensor_c": tank.sensor_c,
             "element_c": temperatures.element_c,
             "still_c": temperatures.still_c,

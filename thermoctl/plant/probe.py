@@ -128,12 +128,12 @@ class ProbeInTank:
         """
         spike_k, self._spike_k = self._spike_k, 0.0
         match self.wiring:
+            case Wiring.SOUND:
+                sound_v = LM335.volts(self._sheath_c + spike_k + self._drift_k)
+                return sound_v * (1.0 + self._parameters.gain_error)
             case Wiring.MISSING:
                 return math.nan
             case Wiring.OPEN:
                 return math.inf
             case Wiring.SHORT:
                 return 0.0
-            case Wiring.SOUND:
-                sound_v = LM335.volts(self._sheath_c + spike_k + self._drift_k)
-                return sound_v * (1.0 + self._parameters.gain_error)

@@ -72,6 +72,7 @@ class Loop:
             for b in self.boards
         }
         self._clock, self._period_s = clock, period_s
+        self._lasts_s = command_lasts_s(period_s)
         self._publish, self._completed = publish, completed
         self._requests: queue.SimpleQueue[Asked] = queue.SimpleQueue()
         self._claimed: list[Asked] = []
@@ -207,8 +208,8 @@ class Loop:
 
     def _see(self, wiring: Wiring, samples: Mapping[int, Mapping[str, RawSample]]) -> Measurement:
         """Return what the sensor of a loop says, or its two sensors together."""
-        first, *second = (self._measure(wiring, i, samples[id(i.board)]) for i in wiring.inputs)
-        return wiring.regulator.fuse(first, second[0]) if second else first
+        seen = [self._measure(wiring, i, samples[id(i.board)]) for i in wiring.inputs]
+        return seen[0] if len(seen) == 1 else wiring.regulator.fuse(*seen)
 
     def _measure(
         self, wiring: Wiring, read: Input, samples: Mapping[str, RawSample]
@@ -243,8 +244,9 @@ class Loop:
                 continue
             now_s = self._clock.now_s()
             drives = {o.channel: self._drive(w, o, steps[w.name].command.power) for w, o in wired}
-            lasts_s = min(steps[w.name].command.valid_until_s - now_s for w, _ in wired)
-            lasts_s = min(lasts_s, command_lasts_s(self._period_s))  # whatever a sample's time says
+            lasts_s = self._lasts_s  # at most, whatever the time of a sample says
+            for w, _ in wired:
+                lasts_s = min(lasts_s, steps[w.name].command.valid_until_s - now_s)
             try:
                 answer = board.write(drives, lasts_s, now_s + EXCHANGE_S)
                 powers = {(w.name, o): o.power(answer.get(o.channel)) for w, o in wired}
