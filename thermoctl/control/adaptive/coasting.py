@@ -102,23 +102,24 @@ def outlook(
     block: Block, path: Path, share: Array, hypotheses: Hypotheses, bounds: tuple[float, float]
 ) -> Outlook:
     """Return the weighted means; `bounds` are the least and the most power."""
-    h, x = hypotheses.period_s, block[:, X]
-    beta, mean = x[BETA], share.dot
-    holding = np.minimum(np.maximum(x[D] / beta, bounds[0]), bounds[1])
+    h, mean = hypotheses.period_s, share.dot
+    d, beta = block[D, X], block[BETA, X]
+    holding = np.minimum(np.maximum(d / beta, bounds[0]), bounds[1])
     coasting = path.under_way - hypotheses.held * holding
     coasting *= beta
-    coasting += x[T]
+    coasting += block[T, X]
     coasting_c, holding_power = float(mean(coasting)), float(mean(holding))
     coasting *= coasting
-    return Outlook(
+    variance = float(mean(coasting)) - coasting_c * coasting_c
+    return Outlook(  # in the order of its fields: by their names it would take twice as long
         coasting_c,
         holding_power,
-        lag_s=float(mean(hypotheses.lag_s)),
-        gain=float(mean(beta)) / h,
-        heater_k=float(mean(hypotheses.element * beta)),
-        surplus=float(mean(path.heat)) - holding_power,
-        spread_k=math.sqrt(max(float(mean(coasting)) - coasting_c * coasting_c, 0.0)),
-        gain_sd=math.sqrt(float(mean(block[BETA, BETA]))) / h,
+        float(mean(hypotheses.lag_s)),
+        float(mean(beta)) / h,
+        float(mean(hypotheses.element * beta)),
+        float(mean(path.heat)) - holding_power,
+        math.sqrt(max(variance, 0.0)),
+        math.sqrt(float(mean(block[BETA, BETA]))) / h,
     )
 
 

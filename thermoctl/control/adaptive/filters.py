@@ -88,9 +88,11 @@ class Constants(NamedTuple):
     ----------
     step, soon : ndarray, shape (5, n)
         `sensor_step` and `sensor_soon` of the hypotheses, for a row of a block.
-    noise_water, noise_loss, noise_gain : float
-        Variances of T, d and beta that a period adds, over the square of the gain.
-    noise_sensor : float
+    noise_water, noise_gain : ndarray, shape (n,)
+        Variances of T and beta that a period adds, over the square of the gain.
+    noise_loss : float
+        That of d at rest.
+    noise_sensor : ndarray, shape (n,)
         Variance of z that it adds.
     gain_noisy : ndarray, shape (n,)
         Least gain of which the noise is taken.
@@ -100,10 +102,10 @@ class Constants(NamedTuple):
 
     step: Array
     soon: Array
-    noise_water: float
-    noise_sensor: float
+    noise_water: Array
+    noise_gain: Array
     noise_loss: float
-    noise_gain: float
+    noise_sensor: Array
     gain_noisy: Array
     gain_min: Array
     gain_max: Array
@@ -121,10 +123,10 @@ def constants(hypotheses: Hypotheses, u_min: float) -> Constants:
     return Constants(
         step=np.tile(hypotheses.sensor_step, (5, 1)),
         soon=np.tile(hypotheses.sensor_soon, (5, 1)),
-        noise_water=DRIFT_T**2 / h,
-        noise_sensor=DRIFT_Z_K**2 * h,
+        noise_water=DRIFT_T**2 / h * one,
+        noise_gain=DRIFT_BETA**2 * h * one,
         noise_loss=DRIFT_D**2 * h,
-        noise_gain=DRIFT_BETA**2 * h,
+        noise_sensor=DRIFT_Z_K**2 * h * one,
         gain_noisy=DRIFT_GAIN_MIN * h * one,
         gain_min=GAIN_MIN * h * one,
         gain_max=GAIN_MAX * h * one,
@@ -183,19 +185,14 @@ def predicted(block: Block, heat: Array, constants: Constants, unrest: float = 0
     ZZ += warming
     after[T, Z] = ZT  # and by symmetry elsewhere
     after[D:, :D] = after[:D, D:X].swapaxes(0, 1)
-    _drift(after, block[BETA, X], constants, unrest)
-    return after
-
-
-def _drift(block: Block, gain: Array, constants: Constants, unrest: float) -> None:
-    """Add the noise of a period, in place."""
-    b2 = np.maximum(gain, constants.gain_noisy)
+    DD, BB = after[D, D], after[BETA, BETA]
+    b2 = np.maximum(block[BETA, X], constants.gain_noisy)
     b2 *= b2
-    water, sensor, loss, beta = block[T, T], block[Z, Z], block[D, D], block[BETA, BETA]
-    water += constants.noise_water * b2
-    sensor += constants.noise_sensor
-    loss += constants.noise_loss * (1.0 + UNREST * unrest) ** 2 * b2
-    beta += constants.noise_gain * b2
+    TT += constants.noise_water * b2
+    ZZ += constants.noise_sensor
+    DD += constants.noise_loss * (1.0 + UNREST * unrest) ** 2 * b2
+    BB += constants.noise_gain * b2
+    return after
 
 
 def loosened(block: Block, heat: Array, due: Array) -> None:
