@@ -448,7 +448,7 @@ def test_within_a_period_heater_and_sensor_are_those_of_a_hundred_short_ones(per
     h, fine = Hypotheses.at_period(period_s), Hypotheses.at_period(period_s / 100.0)
     block = filters.start(h, 25.0)
     way = path_room.pushed(path_room.at_rest(h), replace(h, dead=np.zeros_like(h.dead)), 1.0)
-    water, sensor = filters.predicted(block, way.mean, filters.constants(h, 0.0))[:2, X] - 25.0
+    water, sensor = filters.predicted(block, way.mean, filters.constants(h, 0.0, 1.0))[:2, X] - 25.0
     q, heat, shown = np.zeros((3, len(h)))
     for k in range(100):
         before, q = q, q + fine.element_step * (1.0 - q)

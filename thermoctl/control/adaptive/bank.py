@@ -152,7 +152,7 @@ class Bank:
         if self.u_max <= 0.0:
             raise ValueError(f"u_max must be positive, got {self.u_max!r}")
         object.__setattr__(self, "hypotheses", Hypotheses.at_period(self.period_s))
-        object.__setattr__(self, "constants", filters.constants(self.hypotheses, self.u_min))
+        object.__setattr__(self, "constants", filters.constants(self.hypotheses, *self.bounds))
         object.__setattr__(self, "_arrivals", _arrivals(self.hypotheses))
 
     @property
@@ -217,7 +217,7 @@ class Bank:
         if belief.block is None and not seen:
             return belief._replace(path=way, excitation=ahead.excitation)
         met = self._seen(belief, ahead, y_c) if seen else self._unseen(belief, ahead)
-        view = outlook(met.block, way, met.weights.share, self.hypotheses, self.bounds)
+        view = outlook(met.block, way, met.weights.share, self.hypotheses, self.constants)
         if not math.isfinite(np.vdot(met.block, met.block) + view.coasting_c):
             raise ArithmeticError(f"expected a finite belief after {y_c!r} degC")
         for array in (met.block, *way):

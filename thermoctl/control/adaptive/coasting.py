@@ -32,7 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thermoctl.control.adaptive.filters import BETA, Block, D, T, X
+from thermoctl.control.adaptive.filters import BETA, Block, Constants, D, T, X
 from thermoctl.control.adaptive.hypotheses import Hypotheses
 from thermoctl.control.adaptive.path import Path
 from thermoctl.quantities import Array, clamp
@@ -99,12 +99,12 @@ class Outlook(NamedTuple):
 
 
 def outlook(
-    block: Block, path: Path, share: Array, hypotheses: Hypotheses, bounds: tuple[float, float]
+    block: Block, path: Path, share: Array, hypotheses: Hypotheses, constants: Constants
 ) -> Outlook:
-    """Return the weighted means; `bounds` are the least and the most power."""
+    """Return the means over the hypotheses, weighted by `share`."""
     h, mean = hypotheses.period_s, share.dot
     d, beta = block[D, X], block[BETA, X]
-    holding = np.minimum(np.maximum(d / beta, bounds[0]), bounds[1])
+    holding = np.minimum(np.maximum(d / beta, constants.power_min), constants.power_max)
     coasting = path.under_way - hypotheses.held * holding
     coasting *= beta
     coasting += block[T, X]

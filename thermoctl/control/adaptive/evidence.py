@@ -43,12 +43,12 @@ class Noise(NamedTuple):
 
     def after(self, y_c: float) -> Noise:
         """Return the noise after the valid reading `y_c`."""
-        variance, n = self.variance, self.samples
+        variance, last_c, before_last_c, n = self
         if n >= 2:
-            second = (y_c - 2.0 * self.last_c + self.before_last_c) ** 2 / _SPREAD
-            most = _MOST * max(variance, NOISE_START_K2)
-            variance += (min(second, most) - variance) * max(_MEMORY, 1.0 / (n + 5.0))
-        return Noise(variance, y_c, self.last_c, n + 1)
+            second = y_c - 2.0 * last_c + before_last_c
+            square = min(second * second / _SPREAD, _MOST * max(variance, NOISE_START_K2))
+            variance += (square - variance) * max(_MEMORY, 1.0 / (n + 5.0))
+        return Noise(variance, y_c, last_c, n + 1)
 
     @property
     def believed(self) -> float:

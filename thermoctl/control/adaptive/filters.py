@@ -98,6 +98,8 @@ class Constants(NamedTuple):
         Least gain of which the noise is taken.
     gain_min, gain_max, loss_min, loss_max : ndarray, shape (n,)
         Limits of the gain, and those of the loss in gains.
+    power_min, power_max : ndarray, shape (n,)
+        Least and most power.
     """
 
     step: Array
@@ -111,10 +113,12 @@ class Constants(NamedTuple):
     gain_max: Array
     loss_min: Array
     loss_max: Array
+    power_min: Array
+    power_max: Array
 
 
-def constants(hypotheses: Hypotheses, u_min: float) -> Constants:
-    """Return the constants at the period of `hypotheses`, for a least power `u_min`.
+def constants(hypotheses: Hypotheses, u_min: float, u_max: float) -> Constants:
+    """Return the constants at the period of `hypotheses`, for power in [u_min, u_max].
 
     Noise is diag((.08 b)^2, .003^2, (.0008 b)^2, (2e-4 b)^2) times the period h. The gain of a
     period, and the unit of d and beta, are h times those of a second.
@@ -132,6 +136,8 @@ def constants(hypotheses: Hypotheses, u_min: float) -> Constants:
         gain_max=GAIN_MAX * h * one,
         loss_min=(u_min - LOSS_MIN) * one,
         loss_max=LOSS_MAX * one,
+        power_min=u_min * one,
+        power_max=u_max * one,
     )
 
 
