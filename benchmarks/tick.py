@@ -1,4 +1,4 @@
-"""Time one tick of the regulator, and a simulated hour with plant and JSON lines.
+"""Time one tick of the regulator, and a simulated hour with its plant.
 
 Run with ``python benchmarks/tick.py``. Prints medians with the least and the greatest of several
 runs; these depend on the machine, so nothing is judged by them.
@@ -43,6 +43,12 @@ def seconds(work: Callable[[], None]) -> list[float]:
     return taken
 
 
+def hour() -> None:
+    """Simulate an hour of the aquarium, shadow included."""
+    for _ in simulate(bench_settings(), HOUR_S):
+        pass
+
+
 def hour_with_lines() -> None:
     """Simulate an hour of the aquarium and write every cycle as JSON."""
     with redirect_stdout(io.StringIO()):
@@ -55,6 +61,7 @@ def main() -> None:
     print(f"medians of {RUNS} runs, with their range")
     for name in ("aquarium", "ozbek2021"):
         print(f"regulator step, {name:<28} us {spread(ticks_us(name))}")
+    print(f"simulated hour with plant                  s {spread(seconds(hour))}")
     print(f"simulated hour with plant and JSON lines   s {spread(seconds(hour_with_lines))}")
 
 
