@@ -118,7 +118,7 @@ class Constants(NamedTuple):
 
 
 def constants(hypotheses: Hypotheses, u_min: float, u_max: float) -> Constants:
-    """Return the constants at the period of `hypotheses`, for power in [u_min, u_max].
+    """Return the constants for the period of `hypotheses` and the bounds of power.
 
     Noise is diag((.08 b)^2, .003^2, (.0008 b)^2, (2e-4 b)^2) times the period h. The gain of a
     period, and the unit of d and beta, are h times those of a second.
