@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from thermoctl.ports import Controller, Foretelling, Remembered, Remembering, Situation
+from thermoctl.ports import Controller, Foretelling, Knowing, Remembered, Remembering, Situation
 
 
 class Mind:
@@ -26,6 +26,7 @@ class Mind:
         self._seen: Situation | None = None
         self._foretells = controller if isinstance(controller, Foretelling) else None
         self.remembers = controller if isinstance(controller, Remembering) else None
+        self.knows = controller if isinstance(controller, Knowing) else None
 
     def recall(self, remembered: Remembered) -> bool:
         """Begin with what an earlier run has learnt; return whether the law can."""

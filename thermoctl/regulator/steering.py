@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from thermoctl.ports import Controller, Knowing, Situation
+from thermoctl.ports import Knowing, Situation
 from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.guard import Failure, Guard, attempt
 from thermoctl.regulator.mind import Mind
@@ -66,7 +66,7 @@ class Steering:
     @property
     def tell(self) -> Callable[[], PlantBelief | None]:
         """A function that says what is believed of the plant now, whenever it is called."""
-        return partial(_plant, self.mind.controller, self.mind.belief)
+        return partial(_plant, self.mind.knows, self.mind.belief)
 
     def ride_s(self, situation: Situation, beliefs: Beliefs, most_s: float) -> float:
         """Return how long the model may steer without a sensor: 0 until it is known."""
@@ -95,9 +95,9 @@ class Steering:
         return {str(name): str(text) for name, text in told.items()}
 
 
-def _plant(controller: Controller, belief: Any) -> PlantBelief | None:
-    """Return what `controller` says of its plant; None where it cannot, or fails."""
-    if not isinstance(controller, Knowing):
+def _plant(knows: Knowing | None, belief: Any) -> PlantBelief | None:
+    """Return what a controller says of its plant; None where it cannot, or fails."""
+    if knows is None:
         return None
-    told = attempt(controller.plant, belief)
+    told = attempt(knows.plant, belief)
     return None if isinstance(told, Failure) else told
