@@ -185,3 +185,14 @@ def test_a_figure_is_drawn_whatever_was_never_reached(tmp_path):
     lines = summarise(found, ["law", "other", "absent"])
     assert draw_comparison(lines, ["law", "other", "absent"], files) == files
     assert all(file.stat().st_size > 1000 for file in files)
+
+
+def test_a_figure_has_a_letter_for_each_of_four_units(tmp_path):
+    figures = {"settled_s": 50.0, "largest_k": 0.2, "deviation_k": 0.02, "travel_per_min": 0.3}
+    found = [
+        Result(f"{controller}{scenario}", controller, "tclab", scenario, 0, of, None)
+        for controller, of in (("law", figures), (BOUND, {"deviation_k": 0.01}))
+        for scenario in ("regulation", "second-heater")
+    ]
+    lines = summarise(found, ["law"])
+    assert draw_comparison(lines, ["law"], [tmp_path / "compare.svg"])

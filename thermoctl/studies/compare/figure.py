@@ -64,7 +64,7 @@ def draw_comparison(
         for index, (unit, own) in enumerate(panels):
             panel = axes[index, 0]
             _draw_panel(panel, own, drawn, unit)
-            house.letter(panel, "abc"[index])
+            house.letter(panel, "abcd"[index])
         _write_head(page, lines, drawn, height_in)
         return [house.save(page, path) for path in paths]
 
