@@ -44,14 +44,14 @@ def test_every_scenario_of_a_lab_has_figures_to_meet():
 
 CREEPS = pytest.mark.xfail(
     strict=True,
-    reason="the last .3 K take two minutes: the loss is learnt anew at every set point; measured "
-    "3.42 times the bound, 195 s after a step, and .253 K and 302 s with the second heater",
+    reason="the last .3 K of a warm-up take two minutes, in which a loss is learnt that was small "
+    "when it was cold; measured 2.81 times the bound",
 )
 
 
 def cases():
-    """Return every scenario on three boards; the law misses three figures on the first."""
-    missed = {("warm-up", 0), ("step", 0), ("second-heater", 0)}
+    """Return every scenario on three boards; the law misses one figure on the first."""
+    missed = {("warm-up", 0)}
     for case in ((name, seed) for name in ROWS for seed in range(3)):
         yield pytest.param(*case, marks=[CREEPS] if case in missed else [])
 

@@ -47,22 +47,29 @@ class Filter:
         b = max(self.x[3], 1e-4)
         restless = 1 + 5 * away
         noise = [(0.08 * b) ** 2, 0.003**2, (0.0008 * b * restless) ** 2, (2e-4 * b) ** 2]
+        before = self.x[0]
         self.x = F @ self.x
+        self.grow(self.x[0] - before)
         self.P = F @ self.P @ F.T + self.h * np.diag(noise)
         if t_s - self.h <= 2 * self.lag_s < t_s:
             ridge = np.array([0, 0, 1, 1]) * 0.08 * self.x[3] * self.q
             self.P = self.P + np.outer(ridge, ridge)
+
+    def grow(self, moved):
+        self.x[2] += max(self.x[2], 0.0) * math.tanh(moved / 40)  # what is warmer loses more
 
     def inflate(self, nu, R):
         root = math.sqrt(max(1.0, nu**2 / (self.P[1, 1] + R)))
         D = np.diag([root, root, 1.0, 1.0])
         self.P = D @ self.P @ D
 
-    def correct(self, y, R, u_min, limit_loss, e):
+    def correct(self, y, R, u_min, limit_loss, e, settling):
         S, nu = self.P[1, 1] + R, y - self.x[1]
         K = self.P[:, 1] / S
         K[3] *= e if self.P[3, 3] <= (0.1 * self.x[3]) ** 2 else 1.0
         self.x = self.x + K * nu
+        if settling:
+            self.grow(K[0] * nu)
         A = np.eye(4) - np.outer(K, [0, 1, 0, 0])
         self.P = A @ self.P @ A.T + R * np.outer(K, K)
         self.P = (self.P + self.P.T) / 2
@@ -148,17 +155,17 @@ class PlainBank:
             self.learnt_from_s = self.k * self.h + 5 * likeliest.lag_s
         heard = not jumped and self.k >= 4 and max(self.sums) <= 3
         heard &= self.k * self.h >= max(self.silent_until_s, self.learnt_from_s)
-        settling = not jumped and self.k * self.h < self.silent_until_s
+        settling = self.k * self.h < self.silent_until_s
         shares = [math.exp(each.ln_w) for each in self.filters]
         told = []
         for each in self.filters:
             if jumped:
                 each.inflate(nu_m, R)
-            nu, S = each.correct(y, R, self.u_min, self.k * self.h > 60, e)
+            nu, S = each.correct(y, R, self.u_min, self.k * self.h > 60, e, settling)
             if heard:
                 each.ln_w -= 0.5 * e * (math.log(S) + min(nu**2 / S, 9))
             told.append(math.exp(-0.5 * (math.log(S) + min(nu**2 / S, 9))))
-        for j, each in enumerate(self.filters if settling else []):
+        for j, each in enumerate(self.filters if settling and not jumped else []):
             family = range(j - j % 3, j - j % 3 + 3)  # all shapes of one lag
             kept = sum(shares[i] for i in family) / sum(shares[i] * told[i] for i in family)
             each.ln_w += math.log(told[j] * kept)

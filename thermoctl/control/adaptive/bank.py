@@ -31,7 +31,7 @@ from thermoctl.control.adaptive.evidence import (
     Noise,
     Weights,
 )
-from thermoctl.control.adaptive.filters import X, Z
+from thermoctl.control.adaptive.filters import T, X, Z
 from thermoctl.control.adaptive.hypotheses import Hypotheses
 from thermoctl.control.adaptive.path import Path
 from thermoctl.quantities import Array, clamp, is_finite_number
@@ -282,7 +282,10 @@ class Bank:
         elif drifting.found:
             block = filters.reopened(block)
             drifting = Drifting(silent_until=sample + HOLD_LAGS * lag, disturbed=True)
+        water_c = block[T, X]
         block, nis, S = filters.corrected(block, y_c, R, share)
+        if sample < gate.silent_until:  # what was poured in is colder, and loses less
+            filters.grown(block, block[T, X] - water_c)
         filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
         silent_until = max(EVIDENCE_FROM, gate.silent_until, drifting.silent_until)
         if share > 0.0 and sample >= silent_until and not drifting.suspected:

@@ -38,6 +38,9 @@ DRIFT_T, DRIFT_D, DRIFT_BETA = 0.08, 0.0008, 2e-4
 UNREST = 5.0
 """The noise of d grows by this share for every full range between power and holding power: water on
 its way to another temperature, glass and air behind it, loses what it did not lose before."""
+ROOM_K = 40.0
+"""A loss grows as if the surroundings were so much colder: were that left to the noise of d, every
+set point would have a loss to be learnt anew. Most are nearer, where it grows faster than this."""
 LOSS_LAGS, LOSS_SHARE = 2.0, 0.08
 """After so many lags the heat has arrived, and the gain is known well enough to say how large a
 loss may be: this share of it is the standard deviation that `loosened` adds."""
@@ -174,6 +177,7 @@ def predicted(block: Block, heat: Array, constants: Constants, unrest: float = 0
     warming = block[BETA] * heat
     warming -= block[D]
     water += warming  # F [P | x]
+    grown(after, warming[X])
     sensor += towards
     warming *= c
     sensor += warming
@@ -199,6 +203,17 @@ def predicted(block: Block, heat: Array, constants: Constants, unrest: float = 0
     DD += constants.noise_loss * (1.0 + UNREST * unrest) ** 2 * b2
     BB += constants.noise_gain * b2
     return after
+
+
+def grown(block: Block, moved_k: Array) -> None:
+    """Let the loss go with water that has moved by `moved_k`, in place.
+
+    As d' = d + max(d, 0) tanh(moved / 40 K), which keeps its sign and cannot run away, however long
+    a period is. P is left as it is: beside the noise of d that is little. So is water that gains
+    heat from a warmer room: only who heats and cools has it.
+    """
+    loss = block[D, X]
+    loss += np.maximum(loss, 0.0) * np.tanh(moved_k / ROOM_K)
 
 
 def loosened(block: Block, heat: Array, due: Array) -> None:
