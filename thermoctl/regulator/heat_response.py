@@ -26,6 +26,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from thermoctl.regulator.heat_past import FirstReadings, Past
+
 Heat = tuple[float, ...]
 """Heat that has arrived under each lag, in seconds of full power."""
 
@@ -177,6 +179,9 @@ class HeatResponse:
         What has been learnt.
     jumped : bool
         Whether the last reading moved as no heater and no loss can move it.
+    retracted : bool
+        Whether with the last block all that was learnt since a start has turned out to be
+        worth nothing: what rose may have been heat from before.
     """
 
     def __init__(self) -> None:
@@ -196,14 +201,18 @@ class HeatResponse:
         self.heat_s: Heat = (0.0,) * len(LAGS_S)
         self._line_c = self._slope = self._mixes_s = 0.0
         self._last_c = math.nan
-        self.jumped = False
+        self._start = FirstReadings(Past.OPEN if self.gain is None else Past.NOTHING)
+        self.jumped = self.retracted = False
 
     def observe(self, block: Block, *, learn: bool) -> None:
         """Take one more block in, and learn from it if that is wanted."""
         span_s, reading_c, paths, total = block.span_s, block.reading_c, self._paths, self._total
+        self.jumped = self.retracted = False
+        if learn and abs(block.power - self._start.power) > MOVES:
+            self._learn_anew()
         self._arrive(span_s, block.power)
+        self._start.observe(block.power, reading_c, block.sd_k)
         self._mixes_s -= span_s
-        self.jumped = False
         if math.isnan(self._last_c):
             self._line_c = self._last_c = reading_c
             total.begin_again(reading_c)
@@ -232,6 +241,19 @@ class HeatResponse:
         for path in paths:  # no method: a call for every lag would cost more than this
             path.line += by * path.off
             path.slope += by_per_s * path.off
+
+    def _learn_anew(self) -> None:
+        """Go on as if heat had come for long as it was given since the start."""
+        for path in self._paths:
+            path.squares = path.products = path.along = 0.0
+            path.first = path.second = path.slope = self._start.power
+            path.stand()
+        self._total.squares = self._total.products = 0.0
+        self._total.begin_again(self._last_c)
+        self._squares = self._blocks = self._variance = self._moving_s = 0.0
+        self._line_c, self._slope = self._last_c, self._start.rate / self._span_s
+        self._mean_power, self._start = self._start.power, FirstReadings(Past.NOTHING)
+        self.gain, self.retracted = None, True
 
     def _arrive(self, span_s: float, power: float) -> None:
         """Let `span_s` of `power` go through every lag."""

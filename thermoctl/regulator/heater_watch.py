@@ -196,6 +196,9 @@ class HeaterWatch:
         trusted = self._cut is None and self._distrusted_k <= 0.0
         learns = trusted and (known is None or self._doubt.calm(known, sd_k))
         self._response.observe(block, learn=learns)
+        if self._response.retracted:
+            self._known = None
+            self._go_on()
         if math.isnan(block.reading_c):
             return
         before = self._rows[-1] if self._rows else None
@@ -229,10 +232,8 @@ class HeaterWatch:
             self._begin_trial()
         elif self._trial_s >= self._patience_s:
             given_s = now.t_s - self._trial_from_s
-            why = (
-                f"expected a rise by {block.power:.0%} power in {given_s:.0f} s, got {rise_k:.2f} K"
-            )
-            self._ask(now, self._trial_from_s, why)
+            expected = f"expected a rise by {block.power:.0%} power in {given_s:.0f} s"
+            self._ask(now, self._trial_from_s, f"{expected}, got {rise_k:.2f} K")
 
     def _compare(self, known: Gain, block: Block, before: Seen, now: Seen, t_s: float) -> None:
         """Compare what a known heater should have done with what came."""
@@ -244,9 +245,9 @@ class HeaterWatch:
             self._distrusted_k -= known.mean * (now.heat_s[place] - before.heat_s[place])
         hot = doubt.hot(known, sd_k)
         if hot and self._off_s >= OFF_LAGS * known.lag_s:
-            rows = self._rows
-            rate = heat_question.slope(rows, self._t_s - OFF_LAGS * known.lag_s)
-            self._fail("heater.stuck_on", _rises(rate), t_s)
+            rate = self._climb(known, now, sd_k)
+            if rate > 0.0:  # nothing is proven while too few readings show a slope
+                self._fail("heater.stuck_on", _rises(rate), t_s)
         elif hot or (doubt.cold(known, sd_k, again=again) and block.power >= OFF):
             lags = CREPT_LAGS if doubt.crept else BEFORE_LAGS
             from_s = self._t_s - max(lags * known.lag_s, BEFORE_S)
@@ -270,9 +271,9 @@ class HeaterWatch:
                 self._fail("heater.stuck_on", _rises(rate), t_s)
                 return
         answer, shown = self._answer(cut, block.sd_k, now)
-        heard_s, bad_s = (
-            (HEARD_S, BAD_S) if known is None else (HEARD_LAGS * lag_s, BAD_LAGS * lag_s)
-        )
+        heard_s, bad_s = HEARD_S, BAD_S
+        if known is not None:
+            heard_s, bad_s = HEARD_LAGS * lag_s, BAD_LAGS * lag_s
         if answer is Answer.HEATS:
             if asked_s >= heard_s:
                 self._accept(shown, asked_s)
@@ -368,10 +369,8 @@ class HeaterWatch:
             return
         code = "heater.reversed" if answer is Answer.COOLS else "heater.no_response"
         known = "" if self._known is None else f" instead of {self._known.mean:.3g}"
-        text = (
-            f"{cut.why}; {asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s{known}"
-        )
-        self._fail(code, text, t_s)
+        show = f"{asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s{known}"
+        self._fail(code, f"{cut.why}; {show}", t_s)
 
     def _fail(self, code: str, text: str, t_s: float) -> None:
         """Go to SAFE; to LATCHED at the second time, or where nothing can switch it off."""
