@@ -2,10 +2,14 @@ r"""How much heat a plant loses at other temperatures than the one it has now.
 
 A balance of heat over stretches of some ten seconds, with what was applied and what was read:
 
-.. math:: \dot T = \beta q - \ell(T), \qquad \ell(T) = d + k\,(T - T_c)
+.. math:: \dot T = \beta q - \ell(T) - g\,(T - T_w), \qquad \ell(T) = d + k\,(T - T_c)
 
-with the gain beta, the loss d at the temperature T_c where the plant is, and its slope k. A Kalman
-filter learns all of them together with T, so that the errors of gain and loss keep their
+with the gain beta, the loss d at the temperature T_c where the plant is, and its slope k. What a
+wall still takes up is no loss, for it ends when the wall is as warm: T_w follows T within
+`SOAKS_S`, and g says how much goes there. While a plant warms up for the first time nobody can
+tell k from g, and what holds it is known the worse for that; at rest the two part.
+
+A Kalman filter learns all of them together with T, so that the errors of gain and loss keep their
 correlation: at full power nobody can tell the two apart, while their difference, which says where
 the warming ends, is known well. Mains and draughts wander within minutes; that is counted as noise
 of T with the power density of the wandering, and neighbouring stretches are not taken for more
@@ -22,19 +26,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-T, BETA, D, K = range(4)
+T, BETA, D, K, G = range(5)
 Row = tuple[float, ...]
-"""A number for each of the four."""
+"""A number for each of the five."""
 
-START_SD = (0.1, 0.15, 0.01, 1e-3)
-"""Of T in K, beta and d in K/s, k in 1/s: wide, but for a plant that begins near its rest."""
+START_SD = (0.1, 0.15, 0.01, 1e-3, 1e-3)
+"""Of T in K, beta and d in K/s, k and g in 1/s: wide, but for a plant that begins near its rest."""
 SIGN_SDS = 1.5
 """So many standard deviations from 0 the direction of the gain is taken for known."""
 SCALED = 0.2
-"""Once the rate at full power is known to this share, it is the scale of the two to follow:"""
-LOSS_SHARE, WARMS_AT_LEAST_K = 0.3, 10.0
-"""the loss at the start is about 0, give or take this share of the rate, and the slope so steep at
-most that full power warms by so little."""
+"""Once the rate at full power is known to this share, it is the scale of what follows:"""
+LOSS_SHARE, WARMS_K, SOAKS_K = 0.3, 30.0, 80.0
+"""loss at the start, how far full power warms the plant, and how much colder a wall takes all of it
+(one standard deviation: less loss, farther, colder)."""
+SOAKS_S = 400.0
+"""A wall follows within about so many seconds: 6 l of it beside 60 W/K."""
+WALL_SHARE = 0.35
+"""None follows in just that time; so of the slope that was learnt this share is doubted, as far as
+the plant is still ahead of its walls."""
 WANDER = 0.25
 """Noise of T in a second, as a share of the gain: mains of 1 % (2 % of power) for a minute."""
 DRIFT_BETA, DRIFT_D, DRIFT_K = 2e-4, 3e-4, 5e-4
@@ -97,11 +106,13 @@ class HeatBelief:
     Parameters
     ----------
     x : tuple of float
-        Mean of T in degC, beta and d in K/s, k in 1/s.
+        Mean of T in degC, beta and d in K/s, k and g in 1/s.
     P : tuple of tuple of float
         Their covariance, row by row.
     centre_c : float
         Temperature of which d is the loss.
+    wall_c : float
+        Temperature of what follows more slowly.
     stretches : int
         How many had a reading.
     R : float
@@ -117,6 +128,7 @@ class HeatBelief:
     x: Row
     P: tuple[Row, ...]
     centre_c: float
+    wall_c: float
     stretches: int = 0
     R: float = R_FIRST
     before_c: tuple[float, float] = (math.nan, math.nan)
@@ -139,26 +151,36 @@ class HeatBelief:
         return abs(self.gain) > SIGN_SDS * math.sqrt(self.P[BETA][BETA])
 
     @property
+    def ahead_k(self) -> float:
+        """How far the plant is ahead of its walls."""
+        return self.x[T] - self.wall_c
+
+    @property
     def slope(self) -> float:
         """Slope of the loss in 1/s, at least what `WARMS_AT_MOST_K` allows."""
         return max(self.x[K], abs(self.gain) / WARMS_AT_MOST_K)
 
+    @property
+    def soaks(self) -> float:
+        """Rate in 1/s at which walls take up heat; one that gives it off is none."""
+        return max(self.x[G], 0.0)
+
 
 def start(reading_c: float) -> HeatBelief:
     """Return the belief at the first reading."""
-    P = [[0.0] * 4 for _ in START_SD]
-    for each, sd in enumerate(START_SD):
-        P[each][each] = sd * sd
-    return HeatBelief((reading_c, 0.0, 0.0, 0.0), _rows(P), reading_c)
+    P = [[sd * sd * (row == place) for place in range(5)] for row, sd in enumerate(START_SD)]
+    return HeatBelief((reading_c, 0.0, 0.0, 0.0, 0.0), _rows(P), reading_c, reading_c)
 
 
 def after(belief: HeatBelief, stretch: Stretch) -> HeatBelief:
     """Return the belief after a stretch; without a reading it is carried on."""
     x, P = _predicted(belief, stretch)
     centre_c, y = x[T], stretch.reading_c
+    middle_c = 0.5 * (belief.x[T] + centre_c)
+    wall_c = middle_c + (belief.wall_c - middle_c) * math.exp(-stretch.span_s / SOAKS_S)
     if not math.isfinite(y):
-        unseen = (math.nan, math.nan)
-        return replace(belief, x=x, P=_rows(P), centre_c=centre_c, before_c=unseen, jumps=0.0)
+        carried = replace(belief, x=x, P=_rows(P), centre_c=centre_c, wall_c=wall_c)
+        return replace(carried, before_c=(math.nan, math.nan), jumps=0.0)
     R = _noise(belief, y)
     nu = y - x[T]
     jumps = max(0.0, belief.jumps - FORGIVEN)
@@ -170,7 +192,7 @@ def after(belief: HeatBelief, stretch: Stretch) -> HeatBelief:
             P = [P[T], *([row[T], *(4.0 * p for p in row[BETA:])] for row in P[BETA:])]
     x, rows = _met(x, P, T, nu, R)
     known, before_c = belief.stretches + 1, (y, belief.before_c[0])
-    learnt = HeatBelief(x, rows, centre_c, known, R, before_c, jumps, belief.scaled)
+    learnt = HeatBelief(x, rows, centre_c, wall_c, known, R, before_c, jumps, belief.scaled)
     return learnt if learnt.scaled else _scaled(learnt)
 
 
@@ -199,26 +221,36 @@ def _scaled(belief: HeatBelief) -> HeatBelief:
     if sd > SCALED * abs(rate):
         return belief
     x, P = belief.x, belief.P
-    for place, scale in ((D, LOSS_SHARE * rate), (K, rate / WARMS_AT_LEAST_K)):
-        x, P = _met(x, P, place, -x[place], scale * scale)
+    scales = (LOSS_SHARE * rate, rate / WARMS_K, rate / SOAKS_K)
+    for place, scale in zip((D, K, G), scales, strict=True):
+        wide = [list(row) for row in P]
+        wide[place][place] += scale * scale  # `START_SD` was only a guess
+        x, P = _met(x, wide, place, -x[place], scale * scale)
     return replace(belief, x=x, P=P, scaled=True)
 
 
 def _predicted(belief: HeatBelief, stretch: Stretch) -> tuple[Row, list[list[float]]]:
-    """Return mean and covariance one stretch later, before its reading is looked at."""
+    """Return mean and covariance one stretch later, before its reading is looked at.
+
+    Readings are missing for hours where a heater is stuck on. So the mean goes by a slope that no
+    plant has that runs away by itself, and by the trapezoidal rule, which keeps any stretch stable.
+    """
     span_s, heat_s = stretch.span_s, stretch.heat_s
-    T_c, beta, d, k = belief.x
-    off_k = T_c - belief.centre_c
-    half_k = 0.5 * (heat_s * beta - span_s * (d + k * off_k))
+    T_c, beta, d, k, g = belief.x
+    off_k, ahead_k = T_c - belief.centre_c, belief.ahead_k
+    steep, soaks = belief.slope, belief.soaks
+    begin_k = heat_s * beta - span_s * (d + steep * off_k + soaks * ahead_k)
+    half_k = begin_k / (2.0 + span_s * (steep + soaks))
     risen_ks = span_s * (off_k + half_k)
-    move_k = off_k + heat_s * beta - span_s * d - risen_ks * k
-    bends = 1.0 + max(-0.5, BEND * move_k)
+    ahead_ks = span_s * (ahead_k + half_k)
+    move_k = off_k + heat_s * beta - span_s * d - risen_ks * steep - ahead_ks * soaks
+    bends = 1.0 + max(-0.5, BEND * move_k) if k > 0.0 else 1.0
 
     def moved(v: Sequence[float]) -> Row:
         """Return F v: T moves with the heat and the loss, d with k, and k bends."""
-        T_v, beta_v, d_v, k_v = v
-        T_v += heat_s * beta_v - span_s * d_v - risen_ks * k_v
-        return T_v, beta_v, d_v + move_k * k_v, bends * k_v
+        T_v, beta_v, d_v, k_v, g_v = v
+        T_v += heat_s * beta_v - span_s * d_v - risen_ks * k_v - ahead_ks * g_v
+        return T_v, beta_v, d_v + move_k * k_v, bends * k_v, g_v
 
     columns = [moved(row) for row in belief.P]  # of F P, which is symmetric
     rows = [moved(row) for row in zip(*columns, strict=True)]  # of F P F'
@@ -226,7 +258,7 @@ def _predicted(belief: HeatBelief, stretch: Stretch) -> tuple[Row, list[list[flo
         [0.5 * (p + q) for p, q in zip(row, column, strict=True)]
         for row, column in zip(rows, zip(*rows, strict=True), strict=True)
     ]
-    size, steep = abs(beta), belief.slope
+    size = abs(beta)
     late_s = LAG_SHARE * stretch.late_s
     P[T][T] += size * size * (WANDER * WANDER * span_s + late_s * late_s)
     if P[BETA][BETA] < (VAGUE * size) ** 2:
@@ -234,7 +266,8 @@ def _predicted(belief: HeatBelief, stretch: Stretch) -> tuple[Row, list[list[flo
         P[D][D] += (DRIFT_D * size) ** 2 * span_s
     if P[K][K] < (VAGUE * steep) ** 2:
         P[K][K] += (DRIFT_K * steep) ** 2 * span_s + (BEND_SD * steep * move_k) ** 2
-    return moved(belief.x), P
+    T_c, _, d, _, _ = moved((T_c, beta, d, steep, soaks))
+    return (T_c, beta, d, bends * k, g), P
 
 
 def _rows(P: Sequence[Sequence[float]]) -> tuple[Row, ...]:
@@ -256,17 +289,22 @@ def _noise(belief: HeatBelief, y: float) -> float:
 # -- what follows ----------------------------------------------------------------------------------
 
 
-def spare(belief: HeatBelief, at_c: float, power: float, *, straight: bool = False) -> Known:
+def spare(
+    belief: HeatBelief, at_c: float, power: float, ahead_k: float = 0.0, *, straight: bool = False
+) -> Known:
     """Return how fast `power` would still warm the plant at `at_c`, in K/s.
 
-    With a `straight` loss, that is at least as much as with one that bends.
+    Its walls are colder by `ahead_k`: 0 once it has been there for long. With a `straight` loss,
+    that is at least as much as with one that bends.
     """
     off_k, steep = at_c - belief.centre_c, belief.slope
     away_k = at_c - belief.x[T]
     bent = 0.0 if straight else 0.5 * steep * away_k * abs(away_k)
-    mean = power * belief.gain - belief.x[D] - steep * off_k - BEND * max(bent, 0.0)
-    variance = _variance(belief, power, -1.0, -off_k) + (BEND_SD * bent) ** 2
-    return Known(mean, math.sqrt(variance))
+    mean = power * belief.gain - belief.x[D] - steep * off_k - belief.soaks * ahead_k
+    variance = _variance(belief, (power, -1.0, -off_k, -ahead_k))
+    taken = WALL_SHARE * steep * (belief.ahead_k - ahead_k)
+    variance += (BEND_SD * bent) ** 2 + taken * taken
+    return Known(mean - BEND * max(bent, 0.0), math.sqrt(variance))
 
 
 def holding(belief: HeatBelief, at_c: float) -> Known:
@@ -324,8 +362,10 @@ def arrival(belief: HeatBelief, from_c: float, to_c: float, power: float, rest: 
     rest : Known
         How long the heat that is under way then takes to arrive.
     """
-    way_k = to_c - from_c
-    begin, end = spare(belief, from_c, power), spare(belief, to_c, power)
+    way_k, ahead_k = to_c - from_c, belief.ahead_k
+    begin = spare(belief, from_c, power, ahead_k)
+    then_k = _ahead(ahead_k, way_k, begin.mean)
+    end = spare(belief, to_c, power, then_k)
     slow = min(begin.mean * way_k, end.mean * way_k)
     if not (belief.gain_known and slow > 0.0):
         return Known()
@@ -335,22 +375,25 @@ def arrival(belief: HeatBelief, from_c: float, to_c: float, power: float, rest: 
     time_s = way_k / begin.mean if straight else falling / steep
     by_rate = -way_k / (begin.mean * end.mean)
     by_slope = 0.5 * time_s * time_s if straight else (way_k / end.mean - time_s) / steep
-    variance = _variance(
-        belief,
-        by_rate * power,
-        -by_rate,
-        by_slope - by_rate * (from_c - belief.centre_c),
-    )
+    by_k = by_slope - by_rate * (from_c - belief.centre_c)
+    by_g = -by_rate * 0.5 * (ahead_k + then_k)
+    variance = _variance(belief, (by_rate * power, -by_rate, by_k, by_g))
     variance += (by_slope * 0.5 * BEND_SD * belief.slope * way_k) ** 2
     wander_s = WANDER * belief.gain / begin.mean * math.sqrt(time_s)
-    nearly_s = NEARLY_K / end.mean
-    variance += wander_s * wander_s + nearly_s * nearly_s + rest.sd * rest.sd
-    return Known(time_s + rest.mean, math.sqrt(variance))
+    more_s = math.hypot(wander_s, NEARLY_K / end.mean, rest.sd)
+    return Known(time_s + rest.mean, math.hypot(math.sqrt(variance), more_s))
 
 
-def _variance(belief: HeatBelief, by_beta: float, by_d: float, by_k: float) -> float:
-    """Return the variance of a number with these derivatives."""
-    _, (_, bb, bd, bk), (_, _, dd, dk), (_, _, _, kk) = belief.P
-    variance = by_beta * (by_beta * bb + 2.0 * (by_d * bd + by_k * bk))
-    variance += by_d * (by_d * dd + 2.0 * by_k * dk) + by_k * by_k * kk
-    return max(variance, 0.0)
+def _ahead(ahead_k: float, way_k: float, rate: float) -> float:
+    """Return how far ahead of its walls the plant is after `way_k` at `rate` in K/s."""
+    if not way_k * rate > 0.0:
+        return ahead_k
+    lags = way_k / (rate * SOAKS_S)
+    return ahead_k * math.exp(-lags) - way_k * math.expm1(-lags) / lags
+
+
+def _variance(belief: HeatBelief, by: Row) -> float:
+    """Return the variance of a number with these derivatives by all but T."""
+    rows = zip(by, belief.P[BETA:], strict=True)
+    terms = [one * other * p for one, row in rows for other, p in zip(by, row[BETA:], strict=True)]
+    return max(sum(terms), 0.0)

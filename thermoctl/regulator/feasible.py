@@ -15,6 +15,8 @@ from thermoctl.control import heat_loss
 from thermoctl.control.heat_loss import HeatBelief, Known, Stretch
 from thermoctl.quantities import clamp
 from thermoctl.regulator.alarms import AlarmRegister
+from thermoctl.regulator.foretold import Settling, Slip
+from thermoctl.regulator.guard import Failure
 from thermoctl.regulator.supervisor import Emit
 from thermoctl.signals import Alarm, Feasible, Mode
 
@@ -34,6 +36,8 @@ LAG_DOUBT = 0.4
 """Standard deviation of the time the last heat takes, as a share of it."""
 PATIENCE_S = 864_000.0
 """What is not reached in ten days at the present rate counts as never reached."""
+UNSEEN_S = 60.0
+"""What was foreseen for longer without a reading is told to nobody, and no ground for an alarm."""
 FULL = 0.95
 """Share of the most power that counts as all of it."""
 STEADY = 12
@@ -41,6 +45,7 @@ STEADY = 12
 
 UNREACHABLE = "setpoint.unreachable"
 DRIVEN = "plant.driven"
+FAILED = "balance.failed"
 _PRIORITY = 2
 NONE = 0.02
 """Power below this is none."""
@@ -116,6 +121,9 @@ class Feasibility:
         self._lag_s = LAG_GUESS_S
         self._heat = 0.0  # power that has reached the sensor
         self._reading_c = math.nan
+        self._unseen_s = 0.0
+        self._slip, self._settling = Slip(), Settling()
+        self._failed = False
         self._standings = {UNREACHABLE: Standing(), DRIVEN: Standing()}
         self.known = Feasible()
 
@@ -141,8 +149,7 @@ class Feasibility:
             Lag from heater to reading, where the controller knows it.
         """
         if interval_s > self._unknown_s:
-            self._belief, self._gathered, self._before = None, Gathered(), Gathered()
-            self._heat = 0.0
+            self.forget()
             return False
         if lag_s is not None and lag_s > 0.0:
             self._lag_s = lag_s
@@ -160,6 +167,21 @@ class Feasibility:
             readings + seen,
         )
         return self._gathered.span_s >= STRETCH_S
+
+    def forget(self) -> None:
+        """Begin anew, with nothing known."""
+        self._belief, self._gathered, self._before = None, Gathered(), Gathered()
+        self._heat, self.known = 0.0, Feasible()
+
+    def fail(self, failure: Failure) -> None:
+        """Forget what could not be reckoned with, and say so once.
+
+        No power depends on it, so none is taken away.
+        """
+        self.forget()
+        if not self._failed:
+            self._failed = True
+            self._emit(FAILED, text=failure.text, trace=failure.trace)
 
     def reckon(self, wanted: Wanted, t_s: float) -> None:
         """Learn from the stretch that is complete, and say what it means for `wanted`."""
@@ -180,19 +202,24 @@ class Feasibility:
             ),
         )
         if not belief.finite:
-            self._belief = None
+            self.forget()
             return
         self._belief = belief
-        self.known = self._feasible(belief, wanted)
+        self._unseen_s = 0.0 if now.readings else self._unseen_s + now.span_s
+        if self._unseen_s > UNSEEN_S:
+            self.known = Feasible()
+            return
+        self.known = self._feasible(belief, wanted, t_s)
         self._tell(belief, wanted, t_s)
 
     # -- what follows ----------------------------------------------------------------------------
 
-    def _feasible(self, belief: HeatBelief, wanted: Wanted) -> Feasible:
+    def _feasible(self, belief: HeatBelief, wanted: Wanted, t_s: float) -> Feasible:
         """Return what is known well enough to be told."""
-        holding = heat_loss.holding(belief, wanted.setpoint_c)
+        held = heat_loss.holding(belief, wanted.setpoint_c)
+        holding = self._settling.doubted(held, wanted.setpoint_c, t_s)
         highest = _within(heat_loss.reach(belief, wanted.power_max), SD_MOST_K)
-        arrival = self._arrival(belief, wanted, holding)
+        arrival = self._slip.doubted(self._arrival(belief, wanted, holding), wanted.setpoint_c, t_s)
         arrival = _within(arrival, arrival.mean + self._lag_s)
         return Feasible(*_within(holding, POWER_SD_MOST), *highest, *arrival)
 
@@ -273,7 +300,7 @@ def _driven_sds(belief: HeatBelief, wanted: Wanted) -> float:
     wired_so = belief.gain_known and sign * belief.gain > 0.0
     if not wired_so or sign * (here_c - wanted.setpoint_c) < BEYOND_K:
         return 0.0
-    here = heat_loss.spare(belief, here_c, 0.0)
+    here = heat_loss.spare(belief, here_c, 0.0, belief.ahead_k)
     return sign * here.mean / here.sd
 
 

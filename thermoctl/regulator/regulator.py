@@ -13,7 +13,7 @@ from thermoctl.errors import Refused
 from thermoctl.ports import Controller, Remembered, Situation
 from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.feasible import Feasibility, Wanted
-from thermoctl.regulator.guard import Guard
+from thermoctl.regulator.guard import Failure, Guard, attempt
 from thermoctl.regulator.heater_watch import HeaterWatch
 from thermoctl.regulator.judge import Verdict
 from thermoctl.regulator.learning import Learning
@@ -204,8 +204,9 @@ class Regulator:
         self._shadow.observe(situation, self._steering.mind)
         beliefs = self._steering.beliefs(situation, self._learning.beliefs(t_s))
         self._jump_k = self._jump_for(beliefs)
-        if self._feasibility.observe(interval_s, applied, temperature_c, beliefs.lag_s):
-            self._feasibility.reckon(self._wanted(), t_s)
+        weighed = attempt(self._weigh, interval_s, applied, temperature_c, beliefs.lag_s)
+        if isinstance(weighed, Failure):
+            self._feasibility.fail(weighed)
         ride_s = self._ride_s(situation, beliefs) if verdict is Verdict.MISSING else 0.0
         state = self._supervisor.rule(t_s, ride_s)
         asked, reason = self._ask(situation, state, beliefs)
@@ -268,6 +269,13 @@ class Regulator:
             return self._t_s, self._t_s - before_s
         self._t_s = before_s + period_s  # lost in rounding where a time is absurd, hence:
         return self._t_s, period_s
+
+    def _weigh(
+        self, interval_s: float, applied: float, temperature_c: float, lag_s: float | None
+    ) -> None:
+        """Keep the balance of heat."""
+        if self._feasibility.observe(interval_s, applied, temperature_c, lag_s):
+            self._feasibility.reckon(self._wanted(), self._t_s or 0.0)
 
     def _wanted(self) -> Wanted:
         wishes = self._wishes

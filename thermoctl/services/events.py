@@ -44,6 +44,7 @@ _BY_LEVEL: Final = {
         "socket.failed",
     ),
     "warning": (
+        "balance.failed",
         "board.retry",
         "board.silent",
         "clock.stepped",

@@ -68,14 +68,16 @@ def test_the_arrival_is_that_of_the_plant_within_its_error():
 
 
 def test_the_error_of_an_arrival_is_the_spread_of_arrivals():
-    belief = learnt(Water(), [1.0] * 60 + [0.2] * 30)
+    belief = learnt(Water(), [1.0] * 60 + [0.2] * 120)
     told = heat_loss.arrival(belief, 40.0, 60.0, 1.0, AT_ONCE)
     rng = np.random.default_rng(3)
     draws = rng.multivariate_normal(belief.x, belief.P, 4000)
+    slope, soaks = draws[:, heat_loss.K], draws[:, heat_loss.G]
     rate = draws[:, heat_loss.BETA] - draws[:, heat_loss.D]
-    slope = draws[:, heat_loss.K]
-    begin = rate - slope * (40.0 - belief.centre_c)
-    times_s = -np.log1p(-slope * 20.0 / begin) / slope
+    begin = rate - slope * (40.0 - belief.centre_c) - soaks * belief.ahead_k
+    ahead_k = heat_loss._ahead(belief.ahead_k, 20.0, float(np.median(begin)))
+    end = begin - slope * 20.0 - soaks * (ahead_k - belief.ahead_k)
+    times_s = 20.0 * np.log(begin / end) / (begin - end)
     wander_s = heat_loss.WANDER * belief.gain / float(np.median(begin)) * math.sqrt(told.mean)
     assert told.sd == pytest.approx(math.hypot(float(np.std(times_s)), wander_s), rel=0.3)
 
@@ -148,3 +150,24 @@ def test_a_covariance_is_symmetric_to_the_last_bit_with_and_without_a_reading():
     for stretch in (water.after(0.5), Stretch(SPAN_S, 5.0, math.nan)):
         belief = heat_loss.after(belief, stretch)
         assert tuple(zip(*belief.P, strict=True)) == belief.P
+
+
+def test_a_plant_that_ran_away_when_it_was_last_seen_does_not_do_so_for_ever():
+    water = Water()
+    belief = learnt(water, [1.0, 0.2] * 30)
+    for second in range(60):
+        water.water_c += 0.002 * 1.06**second
+        belief = heat_loss.after(belief, Stretch(SPAN_S, 0.0, water.water_c))
+    assert belief.x[heat_loss.K] < 0.0
+    for _ in range(3000):
+        belief = heat_loss.after(belief, Stretch(SPAN_S, 0.0, math.nan))
+    assert belief.finite
+    assert abs(belief.x[heat_loss.T]) < 2000.0
+    assert math.isfinite(heat_loss.spare(belief, 40.0, 1.0).sd)
+
+
+def test_stretches_of_an_hour_are_as_stable_as_those_of_seconds():
+    belief = learnt(Water(), [1.0, 0.2] * 30)
+    for _ in range(200):
+        belief = heat_loss.after(belief, Stretch(40_000.0, 0.0, math.nan))
+        assert -300.0 < belief.x[heat_loss.T] < 60.0
