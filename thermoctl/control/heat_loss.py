@@ -258,8 +258,7 @@ def _predicted(belief: HeatBelief, stretch: Stretch) -> tuple[Row, list[list[flo
         [0.5 * (p + q) for p, q in zip(row, column, strict=True)]
         for row, column in zip(rows, zip(*rows, strict=True), strict=True)
     ]
-    size = abs(beta)
-    late_s = LAG_SHARE * stretch.late_s
+    size, late_s = abs(beta), LAG_SHARE * stretch.late_s
     P[T][T] += size * size * (WANDER * WANDER * span_s + late_s * late_s)
     if P[BETA][BETA] < (VAGUE * size) ** 2:
         P[BETA][BETA] += (DRIFT_BETA * size) ** 2 * span_s
@@ -388,12 +387,14 @@ def _ahead(ahead_k: float, way_k: float, rate: float) -> float:
     """Return how far ahead of its walls the plant is after `way_k` at `rate` in K/s."""
     if not way_k * rate > 0.0:
         return ahead_k
-    lags = way_k / (rate * SOAKS_S)
-    return ahead_k * math.exp(-lags) - way_k * math.expm1(-lags) / lags
+    lagging_k = rate * SOAKS_S
+    return lagging_k + (ahead_k - lagging_k) * math.exp(-way_k / lagging_k)
 
 
 def _variance(belief: HeatBelief, by: Row) -> float:
     """Return the variance of a number with these derivatives by all but T."""
-    rows = zip(by, belief.P[BETA:], strict=True)
-    terms = [one * other * p for one, row in rows for other, p in zip(by, row[BETA:], strict=True)]
-    return max(sum(terms), 0.0)
+    b, d, k, g = by
+    _, (_, bb, bd, bk, bg), (_, _, dd, dk, dg), (_, _, _, kk, kg), (*_, gg) = belief.P
+    of_b = b * (b * bb + 2.0 * (d * bd + k * bk + g * bg))
+    of_d = d * (d * dd + 2.0 * (k * dk + g * dg))
+    return max(of_b + of_d + k * (k * kk + 2.0 * g * kg) + g * g * gg, 0.0)

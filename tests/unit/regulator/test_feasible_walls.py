@@ -64,10 +64,11 @@ def test_heat_that_a_wall_takes_up_is_not_told_for_loss(follows_s):
     assert known[-1].holding_sd < 0.02
 
 
-def test_a_wall_that_is_still_cold_puts_no_set_point_out_of_reach():
-    bench = Bench(150.0)
-    bench.run(3600, setpoint_c=80.0)
-    assert bench.water_c == pytest.approx(80.0, abs=2.0)
+@pytest.mark.parametrize(("follows_s", "setpoint_c"), [(300.0, 60.0), (500.0, 80.0)])
+def test_a_wall_that_is_still_cold_puts_no_set_point_out_of_reach(follows_s, setpoint_c):
+    bench = Bench(follows_s)
+    bench.run(3600, setpoint_c)
+    assert bench.water_c == pytest.approx(setpoint_c, abs=2.0)
     assert bench.events == []
 
 
