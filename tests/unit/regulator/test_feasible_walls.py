@@ -5,12 +5,14 @@ import math
 import numpy as np
 import pytest
 
+from thermoctl.app.compose import regulator_for
+from thermoctl.app.settings import load
 from thermoctl.control.heat_loss import Known
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.feasible import Feasibility, Wanted
 from thermoctl.regulator.foretold import Settling, Slip
 from thermoctl.regulator.guard import Failure
-from thermoctl.signals import Feasible, Mode
+from thermoctl.signals import Feasible, Measurement, Mode
 
 SETPOINT_C = 37.0
 AIR_C = 22.0
@@ -49,7 +51,7 @@ class Bench:
         return told
 
 
-@pytest.mark.parametrize("follows_s", [100.0, 200.0, 300.0])
+@pytest.mark.parametrize("follows_s", [100.0, 200.0, 330.0])
 def test_heat_that_a_wall_takes_up_is_not_told_for_loss(follows_s):
     told = Bench(follows_s).run(3600)
     truly = HOLDS_PER_K * (SETPOINT_C - AIR_C)
@@ -76,8 +78,10 @@ def test_without_readings_nothing_is_told_and_no_alarm_comes_or_goes():
     bench = Bench(150.0)
     bench.run(1800)
     assert math.isfinite(bench.feasibility.known.holding_power)
-    told = bench.run(1800, setpoint_c=400.0, seen=False)
+    told = bench.run(1800, seen=False)
+    assert math.isfinite(told[3].holding_power)
     assert set(told[8:]) == {Feasible()}
+    bench.run(1800, setpoint_c=400.0, seen=False)
     assert bench.events == []
     assert math.isfinite(bench.run(60)[-1].holding_power)
 
@@ -117,3 +121,16 @@ def test_a_holding_power_that_moves_is_known_no_better_than_it_moved():
         told = settling.doubted(Known(0.4, 0.01), 40.0, float(t_s))
     assert told.sd == pytest.approx(0.01, rel=0.01)
     assert settling.doubted(Known(0.7, 0.01), 60.0, 6000.0).sd == 0.01
+
+
+def test_a_balance_that_raises_costs_the_loop_neither_its_step_nor_its_heat(monkeypatch):
+    def failing(*_):
+        raise OverflowError("math range error")
+
+    regulator = regulator_for(load({"loops": {"tank": {"mode": "auto", "setpoint_c": 40.0}}}))
+    monkeypatch.setattr("thermoctl.control.heat_loss.after", failing)
+    steps = [regulator.step(Measurement(float(t_s), 22.0 + 0.01 * t_s)) for t_s in range(60)]
+    assert [event.name for step in steps for event in step.events if "fail" in event.name] == [
+        "balance.failed"
+    ]
+    assert steps[-1].command.power > 0.0
