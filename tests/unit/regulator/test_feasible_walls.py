@@ -127,7 +127,8 @@ def test_a_balance_that_raises_costs_the_loop_neither_its_step_nor_its_heat(monk
     def failing(*_):
         raise OverflowError("math range error")
 
-    regulator = regulator_for(load({"loops": {"tank": {"mode": "auto", "setpoint_c": 40.0}}}))
+    loop = {"mode": "auto", "setpoint_c": 40.0, "trip_above_c": 95.0}
+    regulator = regulator_for(load({"loops": {"tank": loop}}))
     monkeypatch.setattr("thermoctl.control.heat_loss.after", failing)
     steps = [regulator.step(Measurement(float(t_s), 22.0 + 0.01 * t_s)) for t_s in range(60)]
     assert [event.name for step in steps for event in step.events if "fail" in event.name] == [
