@@ -55,7 +55,8 @@ def test_a_missing_sample_is_ridden_on_the_model_at_most_at_holding_power(warm):
     holding = warm.steps[-1].beliefs.holding_power
     ridden = warm.step(Quality.MISSING)
     assert ridden.state is State.RIDE
-    assert 0.0 < ridden.command.power <= holding
+    assert 0.0 < ridden.command.power <= ridden.beliefs.holding_power
+    assert ridden.beliefs.holding_power == pytest.approx(holding, rel=1e-5)  # foreseen, not new
 
 
 def test_a_ride_alarms_after_five_seconds_and_ends_safe_within_a_minute(warm):
