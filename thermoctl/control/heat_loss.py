@@ -101,7 +101,7 @@ class Stretch(NamedTuple):
 class HeatBelief:
     """What is believed of gain and loss.
 
-    Plain numbers: for four of them arrays take twice as long.
+    Plain numbers: for so few of them arrays take twice as long.
 
     Parameters
     ----------
