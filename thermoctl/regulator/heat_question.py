@@ -138,3 +138,8 @@ def slope(
     y = np.array([row.reading_c for row in meant])
     squares = float(t @ t)
     return float(t @ y) / squares - SURE * less_sd_k / math.sqrt(squares)
+
+
+def told_of(rate: float) -> str:
+    """Return what is to be said of a reading that rises by `rate` in K/s."""
+    return f"expected no rise without power, got {60.0 * rate:+.2f} K a minute"

@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
-from thermoctl.quantities import is_finite_number
 from thermoctl.regulator import heat_question
 from thermoctl.regulator.heat_blocks import Blocks, Repeats
+from thermoctl.regulator.heat_check import HeaterCheck
 from thermoctl.regulator.heat_doubt import HeatDoubt, Seen
 from thermoctl.regulator.heat_question import Answer
 from thermoctl.regulator.heat_response import LAGS_S, Block, Gain, HeatResponse
@@ -55,6 +54,10 @@ no more than so many times the old one at once."""
 WILD, RESTS = 1.3, 0.5
 """A reading that falls faster than a heater which cools this much better than it heated: ice in the
 water, or a sensor in the air. What follows the cut is then no answer; it is over at the second."""
+NEARLY_FULL = 0.9
+"""A heater that an earlier run knew has to show a rise only at so much power."""
+RECALLED_S = 600.0
+"""So long what that knew is better than what this run has learnt."""
 LATELY_S = 1800.0
 """A second verdict within this time latches."""
 ROWS = 450
@@ -68,40 +71,6 @@ _LIKELY_TEXT = "{:.0f} s without power do not show it surely, but a gain of {:.2
 _WILD_TEXT = "the reading fell faster than any heater can make it, so the cut says nothing"
 _NOT_SEEN = Gain(math.nan, math.nan, 0)
 _FAULTS = {"heater.no_response": 23, "heater.reversed": 3, "heater.stuck_on": 24}
-
-
-@dataclass(frozen=True, slots=True)
-class HeaterCheck:
-    """How a heater is checked.
-
-    Parameters
-    ----------
-    weakest_k_per_s : float
-        Least rise at full power that a healthy plant can have, in K/s; 6e-5 is 50 W in 200 l.
-    first_heat_s : float
-        Seconds of full power an unknown heater has to show that it heats, before it is asked. Less
-        power has longer, by its cube: it does less harm, and a plant that is only held at its set
-        point shows no rise.
-    action : {'heat', 'cool'}
-        What power does to the plant.
-
-    Raises
-    ------
-    ValueError
-        An argument is outside its range.
-    """
-
-    weakest_k_per_s: float = 6e-5
-    first_heat_s: float = 60.0
-    action: Literal["heat", "cool"] = "heat"
-
-    def __post_init__(self) -> None:
-        for name, low, high in (("weakest_k_per_s", 1e-6, 0.5), ("first_heat_s", 10.0, 3600.0)):
-            value = getattr(self, name)
-            if not (is_finite_number(value) and low <= value <= high):
-                raise ValueError(f"{name} must lie within {low:g} to {high:g}, got {value!r}")
-        if self.action not in ("heat", "cool"):
-            raise ValueError(f"action must be 'heat' or 'cool', got {self.action!r}")
 
 
 class _Cut(NamedTuple):
@@ -138,6 +107,8 @@ class HeaterWatch:
         self._response, self._doubt = HeatResponse(), HeatDoubt()
         self._supervisor, self._emit = supervisor, emit
         self._known: Gain | None = None
+        self._recalled = False  # whether that is of an earlier run, and not yet seen in this one
+        self._settled_s = 0.0  # from then on, what was on its way at the start has arrived
         self._rows: deque[Seen] = deque(maxlen=ROWS)
         self._cut: _Cut | None = None
         self._t_s = self._off_s = 0.0
@@ -150,6 +121,16 @@ class HeaterWatch:
     def asks(self) -> bool:
         """Whether power has to be 0 now, for the sake of a question."""
         return self._cut is not None
+
+    @property
+    def known(self) -> Gain | None:
+        """What is known of the heater, once it is."""
+        return self._known
+
+    def recall(self, known: Gain) -> None:
+        """Begin with what an earlier run knew; in the end this one learns it."""
+        self._known, self._recalled = known, True
+        self._settled_s = OFF_LAGS * self._longer_s(known)
 
     def observe(self, t_s: float, interval_s: float, reading_c: float, applied: float) -> None:
         """Take in the `applied` power of the last interval and the reading at its end.
@@ -196,7 +177,7 @@ class HeaterWatch:
         trusted = self._cut is None and self._distrusted_k <= 0.0
         learns = trusted and (known is None or self._doubt.calm(known, sd_k))
         self._response.observe(block, learn=learns)
-        if self._response.retracted:
+        if self._response.retracted and not self._recalled:
             self._known = None
             self._go_on()
         if math.isnan(block.reading_c):
@@ -209,9 +190,10 @@ class HeaterWatch:
             return
         if learns:
             self._know(now)
-        if self._known is None:
+        if self._known is None or self._recalled:
             self._try(block, now)
-        elif before is not None:
+        settled = self._t_s >= self._settled_s and self._cut is None
+        if self._known is not None and settled and before is not None:
             self._compare(self._known, block, before, now, t_s)
 
     def _know(self, now: Seen) -> None:
@@ -219,13 +201,21 @@ class HeaterWatch:
         gain = self._response.gain
         if gain is None or gain is self._known or gain.mean <= SURE * gain.sd:
             return
+        if self._recalled and self._t_s < RECALLED_S:
+            return
         if now.heat_s[gain.place] > ARRIVED_LAGS * gain.lag_s:
-            self._known = gain
+            self._known, self._recalled = gain, False
+
+    def _longer_s(self, known: Gain) -> float:
+        """Return the lag of a heater, or a longer one where it may be another than it was."""
+        longer = min(known.place + self._recalled, len(LAGS_S) - 1)
+        return LAGS_S[longer]
 
     def _try(self, block: Block, now: Seen) -> None:
         """Let an unknown heater show a rise; ask it when it has had its heat."""
         self._lowest_c = min(self._lowest_c, now.reading_c)
-        self._trial_s += block.power**3 * block.span_s  # at a fifth of the power: 2 hours
+        counts = block.power**3 if self._known is None else float(block.power > NEARLY_FULL)
+        self._trial_s += counts * block.span_s  # an unknown one at a fifth of the power: 2 hours
         rise_k = now.reading_c - self._lowest_c
         if rise_k > max(RISE_K, RISE_SDS * block.sd_k):
             self._patience_s = self._check.first_heat_s
@@ -237,17 +227,20 @@ class HeaterWatch:
 
     def _compare(self, known: Gain, block: Block, before: Seen, now: Seen, t_s: float) -> None:
         """Compare what a known heater should have done with what came."""
+        sure = self._recalled or self._t_s > RECALLED_S  # of the lag
+        if sure and self._heated(known, now, block.sd_k, t_s):
+            return
         doubt, sd_k, jumped = self._doubt, block.sd_k, self._response.jumped
         again = self._distrusted_k > 0.0
         doubt.compare(known, block, before, now, jumped=jumped, follow=not again)
         if again and doubt.calm(known, sd_k):
             place = known.place
             self._distrusted_k -= known.mean * (now.heat_s[place] - before.heat_s[place])
-        hot = doubt.hot(known, sd_k)
-        if hot and self._off_s >= OFF_LAGS * known.lag_s:
+        hot = doubt.hot(known, sd_k) and not self._recalled  # less water is no fault
+        if hot and self._off_s >= OFF_LAGS * self._longer_s(known):
             rate = self._climb(known, now, sd_k)
             if rate > 0.0:  # nothing is proven while too few readings show a slope
-                self._fail("heater.stuck_on", _rises(rate), t_s)
+                self._fail("heater.stuck_on", heat_question.told_of(rate), t_s)
         elif hot or (doubt.cold(known, sd_k, again=again) and block.power >= OFF):
             lags = CREPT_LAGS if doubt.crept else BEFORE_LAGS
             from_s = self._t_s - max(lags * known.lag_s, BEFORE_S)
@@ -264,16 +257,12 @@ class HeaterWatch:
     def _hear(self, cut: _Cut, block: Block, now: Seen, t_s: float) -> None:
         """Look for an answer; go on when it is a good one, fail when it is none."""
         known, asked_s = self._known, now.t_s - cut.at_s
-        lag_s = LAGS_S[-1] if known is None else known.lag_s
-        if known is not None and self._off_s > (OFF_LAGS + 1.0) * lag_s:
-            rate = self._climb(known, now, block.sd_k)
-            if rate > RISES * known.mean:
-                self._fail("heater.stuck_on", _rises(rate), t_s)
-                return
+        lag_s = LAGS_S[-1] if known is None else self._longer_s(known)
+        if known is not None and self._heated(known, now, block.sd_k, t_s):
+            return
         answer, shown = self._answer(cut, block.sd_k, now)
-        heard_s, bad_s = HEARD_S, BAD_S
-        if known is not None:
-            heard_s, bad_s = HEARD_LAGS * lag_s, BAD_LAGS * lag_s
+        heard_s = HEARD_S if known is None else HEARD_LAGS * lag_s
+        bad_s = BAD_S if known is None else BAD_LAGS * lag_s
         if answer is Answer.HEATS:
             if asked_s >= heard_s:
                 self._accept(shown, asked_s)
@@ -332,6 +321,16 @@ class HeaterWatch:
         turned = {Answer.HEATS: after < before, Answer.COOLS: after > before}
         return (answer if turned.get(answer, True) else Answer.OPEN), shown
 
+    def _heated(self, known: Gain, now: Seen, sd_k: float, t_s: float) -> bool:
+        """Return whether the reading has risen long after the power went, and latch that."""
+        if self._off_s <= (OFF_LAGS + 1.0) * self._longer_s(known):
+            return False
+        rate = self._climb(known, now, sd_k)
+        heated = rate > RISES * known.mean
+        if heated:
+            self._fail("heater.stuck_on", heat_question.told_of(rate), t_s)
+        return heated
+
     def _climb(self, known: Gain, now: Seen, sd_k: float) -> float:
         """Return how fast the reading surely rises, in K/s, when nothing is under way any more."""
         from_s = now.t_s - max(OFF_LAGS * known.lag_s, BEFORE_S)
@@ -352,6 +351,7 @@ class HeaterWatch:
             self._known = known = shown._replace(cools_per_s=cools_per_s)
         elif shown.mean > known.mean / CHANGED:
             self._known = known = known._replace(mean=min(shown.mean, AT_ONCE * known.mean))
+        self._recalled = False
         self._doubt.trust(known)
         self._patience_s = self._check.first_heat_s
         self._distrusted_k = 0.0
@@ -361,8 +361,12 @@ class HeaterWatch:
         """Fail a heater that answered with nothing, or the wrong way.
 
         One that is not known is asked a second time before anybody is told: while a plant that was
-        never seen comes to rest, anything may move its reading for a minute.
+        never seen comes to rest, anything may move its reading for a minute. One that an earlier
+        run knew may be a weaker one by now, where a little is an answer.
         """
+        if self._recalled and shown.mean > heat_question.SURE * shown.sd:
+            self._accept(shown, asked_s)
+            return
         if self._known is None and self._t_s - self._failed_s >= LATELY_S:
             self._failed_s, self._patience_s = self._t_s, self._check.first_heat_s
             self._go_on()
@@ -378,6 +382,8 @@ class HeaterWatch:
         self._supervisor.fail(code, fault, text, t_s)
         if code == "heater.stuck_on" or self._t_s - self._failed_s < LATELY_S:
             self._supervisor.latch(code, fault, text, t_s)
+            if self._recalled:  # once it is mended, or acknowledged, it is a new one
+                self._known, self._recalled = None, False
         self._failed_s, self._patience_s = self._t_s, self._check.first_heat_s
         if self._known is not None:
             self._distrusted_k = 2.0 * self._known.stored_k
@@ -392,8 +398,3 @@ class HeaterWatch:
 def _longest_s(known: Gain, sd_k: float) -> float:
     """Return how long the answer of a known heater is waited for."""
     return max(LONGEST_S, LONGEST_LAGS * known.lag_s, LONGEST_SDS * sd_k / known.mean)
-
-
-def _rises(rate: float) -> str:
-    """Return what is to be said of a reading that rises by `rate` in K/s."""
-    return f"expected no rise without power, got {60.0 * rate:+.2f} K a minute"

@@ -1,4 +1,4 @@
-"""What outlives a restart of what controllers have learnt.
+"""What outlives a restart of what controllers and the heater check have learnt.
 
 A model that cannot be taken up costs nothing but itself: its law begins with nothing, as the first
 time, and an event says why.
@@ -12,7 +12,10 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from thermoctl.ports import Remembered, Remembering
+from thermoctl.regulator import heat_memory
 from thermoctl.regulator.guard import Failure, attempt
+from thermoctl.regulator.heat_response import Gain
+from thermoctl.regulator.heater_watch import HeaterWatch
 from thermoctl.regulator.mind import Mind
 from thermoctl.regulator.supervisor import Emit
 
@@ -35,6 +38,19 @@ def recall(minds: Iterable[Mind | None], remembered: Mapping[str, Remembered], e
             emit("model.recalled", controller=mind.name, age_s=round(kept.age_s))
 
 
+def recall_heater(
+    watch: HeaterWatch | None, remembered: Mapping[str, Remembered], emit: Emit
+) -> None:
+    """Let the `watch` over a heater begin with what is remembered of it."""
+    kept = remembered.get(heat_memory.NAME)
+    if watch is None or kept is None:
+        return
+    try:
+        watch.recall(heat_memory.recall(kept.model))
+    except ValueError as error:
+        emit("model.ignored", controller=heat_memory.NAME, why=str(error))
+
+
 def origin(mind: Mind) -> str | None:
     """Return how the model of `mind` began; None of a law without a memory."""
     if mind.remembers is None:
@@ -43,21 +59,23 @@ def origin(mind: Mind) -> str | None:
     return told if isinstance(told, str) else None
 
 
-def remembering(minds: Iterable[Mind | None]) -> Callable[[], Models]:
-    """Return a function that says what `minds`, as they are, would like kept."""
+def remembering(minds: Iterable[Mind | None], watch: HeaterWatch | None) -> Callable[[], Models]:
+    """Return a function that says what `minds` and `watch` would like kept now."""
     held = [
         (mind.name, mind.remembers, mind.belief)
         for mind in minds
         if mind is not None and mind.remembers is not None
     ]
-    return partial(_remembered, held)
+    return partial(_remembered, held, None if watch is None else watch.known)
 
 
-def _remembered(held: Iterable[tuple[str, Remembering, Any]]) -> Models:
-    """Return what each law makes of its belief; nothing of one that fails."""
+def _remembered(held: Iterable[tuple[str, Remembering, Any]], heater: Gain | None) -> Models:
+    """Return what each law makes of its belief, nothing of one that fails; and the heater."""
     models: dict[str, Mapping[str, Any]] = {}
     for name, law, belief in held:
         told = attempt(law.remember, belief)
         if told is not None and not isinstance(told, Failure):
             models[name] = told
+    if heater is not None:
+        models[heat_memory.NAME] = heat_memory.remember(heater)
     return models

@@ -21,7 +21,13 @@ from thermoctl.regulator.load import KnownLoad
 from thermoctl.regulator.mind import Mind
 from thermoctl.regulator.pairing import Pairing
 from thermoctl.regulator.plan import Plan
-from thermoctl.regulator.recollection import NOTHING, origin, recall, remembering
+from thermoctl.regulator.recollection import (
+    NOTHING,
+    origin,
+    recall,
+    recall_heater,
+    remembering,
+)
 from thermoctl.regulator.shadow import Shadow
 from thermoctl.regulator.steering import Steering
 from thermoctl.regulator.supervisor import Supervisor
@@ -58,7 +64,7 @@ class Regulator:
     latched : Alarm, optional
         A latch of an earlier run; the heater stays off until it is acknowledged.
     remembered : mapping, optional
-        What controllers of an earlier run have learnt, by their names.
+        What controllers of an earlier run have learnt, by their names, and the heater check.
     """
 
     def __init__(
@@ -93,6 +99,7 @@ class Regulator:
         self._applied: float | None = None
         self._unknown_powers = 0
         recall((self._steering.mind, self._shadow.mind), remembered, self._emit)
+        recall_heater(self._watch, remembered, self._emit)
         if latched is not None:
             text = _EARLIER_TEXT.format(latched.text)
             self._supervisor.latch(latched.code, latched.fault, text, 0.0)
@@ -361,7 +368,7 @@ class Regulator:
             load,
             self._steering.tell,
             origin(self._steering.mind),
-            remembering((self._steering.mind, self._shadow.mind)),
+            remembering((self._steering.mind, self._shadow.mind), self._watch),
         )
 
     def _emit(self, name: str, **fields: object) -> None:

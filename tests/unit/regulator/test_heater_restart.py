@@ -1,13 +1,17 @@
 """A watch that begins in the middle of things: heat may be on its way that it has not seen."""
 
+import copy
 import math
 from collections import deque
 
 import numpy as np
 import pytest
 
+from thermoctl.regulator import heat_memory
+from thermoctl.regulator.heat_check import HeaterCheck
 from thermoctl.regulator.heat_past import FirstReadings
-from thermoctl.regulator.heater_watch import HeaterCheck, HeaterWatch
+from thermoctl.regulator.heat_response import Gain
+from thermoctl.regulator.heater_watch import HeaterWatch
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import Measurement, State
@@ -44,15 +48,16 @@ class Vessel:
         for _ in range(seconds):
             self._flow(0.0)
 
-    def warm_up(self, seconds, to_c=37.5):
-        """Give full power below `to_c`, and none above."""
+    def warm_up(self, seconds, to_c=37.5, law=None):
+        """Give full power below `to_c`, and none above; or what `law` makes of the reading."""
+        law = law or (lambda reading_c: 1.0 if reading_c < to_c else 0.0)
         for _ in range(seconds):
             self._flow(self.does(self.applied))
             reading_c = self.water_c + 0.03 * self.rng.standard_normal()
             self.supervisor.judge(Measurement(self.t_s, reading_c), self.t_s, 1.0)
             self.watch.observe(self.t_s, 1.0, reading_c, self.applied)
             free = self.supervisor.rule(self.t_s, 0.0) is State.RUN and not self.watch.asks
-            self.applied = 1.0 if free and reading_c < to_c else 0.0
+            self.applied = law(reading_c) if free else 0.0
         return self
 
     def _flow(self, power):
@@ -75,21 +80,103 @@ def test_heat_from_before_a_quick_restart_is_no_heater_that_is_stuck_on(lag_s, d
 
 def test_the_lag_that_seemed_to_be_none_is_learnt_from_the_first_move_of_the_power():
     vessel = Vessel().warm_up(150).begin().warm_up(60)
-    assert vessel.watch._known.lag_s < 10.0
+    assert vessel.watch.known.lag_s < 10.0
     vessel.warm_up(600)
-    assert vessel.watch._known.lag_s == 45.0
-    assert abs(vessel.watch._known.mean / vessel.gain - 1.0) < 0.3
+    assert vessel.watch.known.lag_s == 45.0
+    assert abs(vessel.watch.known.mean / vessel.gain - 1.0) < 0.3
 
 
 def test_a_slope_that_nobody_can_tell_proves_nothing():
     vessel = Vessel().warm_up(900)
-    known = vessel.watch._known
+    known = vessel.watch.known
     vessel.watch._known = known._replace(place=0, mean=0.2 * known.mean)
     vessel.watch._rows.clear()
     vessel.watch._doubt._extra_k = math.inf
     vessel.applied = 0.0
     vessel.warm_up(12, to_c=0.0)
     assert "nan" not in " ".join(str(fields.get("text")) for _, fields in vessel.events)
+
+
+def recalled(vessel):
+    """Return the vessel under a new watch that was told what the one before knew."""
+    known = heat_memory.recall(heat_memory.remember(vessel.watch.known))
+    vessel.begin().watch.recall(known)
+    return vessel
+
+
+def held(vessel, seconds, power):
+    """Hold `power`, wherever nobody forbids it."""
+    return vessel.warm_up(seconds, law=lambda _: power)
+
+
+def test_a_heater_that_an_earlier_run_knew_is_not_asked_at_rest():
+    at_rest = held(Vessel(loss=0.0225).warm_up(900), 400, 0.5)
+    new, told = copy.deepcopy(at_rest).begin(), recalled(copy.deepcopy(at_rest))
+    assert "heater.questioned" in held(new, 1500, 0.5).names()
+    assert held(told, 1500, 0.5).names() == []
+
+
+@pytest.mark.parametrize("began_s", [90, 180, 270])
+@pytest.mark.parametrize("down_s", [0, 10])
+def test_a_restart_that_remembers_finds_no_fault_in_heat_from_before(began_s, down_s):
+    known = Vessel().warm_up(900).watch.known
+    vessel = Vessel().warm_up(began_s)
+    vessel.pass_by(down_s)
+    vessel.begin().watch.recall(known)
+    assert vessel.warm_up(900).names() == []
+
+
+def test_a_heater_stuck_on_since_before_a_restart_is_found_by_who_remembers_it():
+    vessel = recalled(Vessel().warm_up(900))
+    began_c = vessel.water_c
+    vessel.does = lambda _: 1.0
+    vessel.warm_up(300)
+    assert vessel.names() == ["heater.stuck_on"]
+    assert vessel.supervisor.state is State.LATCHED
+    assert vessel.water_c - began_c < 0.036 * 300
+
+
+def test_another_heater_than_was_remembered_is_not_condemned():
+    known = Vessel(gain=0.1, lag_s=10.0).warm_up(900).watch.known
+    for lag_s in (20.0, 45.0, 90.0):
+        vessel = Vessel(gain=0.02, lag_s=lag_s, loss=0.004)
+        vessel.watch.recall(known)
+        vessel.warm_up(2400)
+        assert set(vessel.names()) <= {"heater.questioned", "heater.answered"}, lag_s
+        assert abs(vessel.watch.known.mean / 0.02 - 1.0) < 0.4
+
+
+def test_less_water_than_was_remembered_is_no_doubt():
+    known = Vessel().warm_up(900).watch.known
+    vessel = Vessel(gain=0.36, lag_s=10.0, loss=0.02)
+    vessel.watch.recall(known)
+    assert vessel.warm_up(900).names() == []
+
+
+@pytest.mark.parametrize("does", [lambda power: 0.0, lambda power: -power])
+def test_a_remembered_heater_that_has_failed_is_latched(does):
+    vessel = recalled(Vessel().warm_up(900))
+    vessel.does = does
+    vessel.warm_up(2400)
+    assert vessel.supervisor.state is State.LATCHED
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("gain_k_per_s", 0.0),
+        ("gain_k_per_s", math.nan),
+        ("gain_sd_k_per_s", "0.1"),
+        ("lag_s", -4.0),
+        ("cools_per_s", None),
+        ("gian_k_per_s", 0.1),
+    ],
+)
+def test_a_memory_that_makes_no_sense_is_refused_by_its_name(name, value):
+    model = heat_memory.remember(Gain(0.04, 0.001, 3, 0.001))
+    assert heat_memory.recall(model) == Gain(0.04, 0.001, 3, 0.001)
+    with pytest.raises(ValueError, match=name):
+        heat_memory.recall(model | {name: value})
 
 
 def seen(readings_c, sd_k=0.01, powers=None):

@@ -103,3 +103,20 @@ def test_nonsense_costs_no_power_and_gives_none():
     for second_s in range(30):
         measured = Measurement(float(second_s), 20.0 + 0.01 * second_s)
         assert first.step(measured).command == second.step(measured).command
+
+
+HEATER = {"gain_k_per_s": 0.04, "gain_sd_k_per_s": 0.001, "lag_s": 45.0, "cools_per_s": 0.0}
+
+
+def test_what_the_heater_check_knows_goes_on_and_is_kept():
+    step = first_step(regulator(remembered={"heater-check": HEATER}))
+    assert events(step) == []
+    assert step.remember()["heater-check"] == HEATER
+
+
+def test_nonsense_of_the_heater_check_is_ignored_with_the_reason():
+    step = first_step(regulator(remembered={"heater-check": HEATER | {"lag_s": -1.0}}))
+    ((name, fields),) = events(step)
+    assert (name, fields["controller"]) == ("model.ignored", "heater-check")
+    assert "lag_s" in fields["why"]
+    assert "heater-check" not in step.remember()
