@@ -146,13 +146,6 @@ def test_another_heater_than_was_remembered_is_not_condemned():
         assert abs(vessel.watch.known.mean / 0.02 - 1.0) < 0.4
 
 
-def test_less_water_than_was_remembered_is_no_doubt():
-    known = Vessel().warm_up(900).watch.known
-    vessel = Vessel(gain=0.36, lag_s=10.0, loss=0.02)
-    vessel.watch.recall(known)
-    assert vessel.warm_up(900).names() == []
-
-
 @pytest.mark.parametrize("does", [lambda power: 0.0, lambda power: -power])
 def test_a_remembered_heater_that_has_failed_is_latched(does):
     vessel = recalled(Vessel().warm_up(900))
