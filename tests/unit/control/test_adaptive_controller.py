@@ -228,6 +228,24 @@ def test_a_heater_that_cools_or_is_dead_is_remarked_on(gain):
     )
 
 
+def test_a_plant_quicker_than_any_that_is_believed_in_is_held_and_remarked_on():
+    law = Adaptive()
+    quick = Vessel(gain=1.8, loss=0.3, noise_k=0.05)
+    belief, waters = steered(law, quick, 1500, r=120.0)
+    assert law.remarks(belief) == {
+        "controller.gain_doubtful": "expected less than 0.9 K/s at full power, learnt 1"
+    }
+    assert np.abs(waters[900:] - 120.0).max() < 0.1
+
+
+def test_a_board_that_rises_by_seven_tenths_of_a_kelvin_a_second_is_believed_in():
+    law = Adaptive()
+    belief, waters = steered(law, Vessel(gain=0.7, loss=0.2, noise_k=0.05), 900, r=60.0)
+    assert 0.52 < law.plant(belief).gain_k_per_s < 0.8
+    assert np.abs(waters[500:] - 60.0).max() < 0.1
+    assert law.remarks(belief) == {}
+
+
 def test_a_sound_heater_is_not_remarked_on_even_if_it_is_weak():
     law = Adaptive()
     belief, _ = steered(law, Vessel(gain=0.0008, loss=0.0002), 1500)

@@ -73,7 +73,7 @@ class Filter:
         A = np.eye(4) - np.outer(K, [0, 1, 0, 0])
         self.P = A @ self.P @ A.T + R * np.outer(K, K)
         self.P = (self.P + self.P.T) / 2
-        self.x[3] = min(max(self.x[3], 2e-5), 0.5)
+        self.x[3] = min(max(self.x[3], 2e-5), 1.0)
         if limit_loss:
             self.x[2] = min(max(self.x[2], (u_min - 0.5) * self.x[3]), 0.95 * self.x[3])
         return nu, S
@@ -106,7 +106,12 @@ class PlainBank:
         self.powers = [u, *self.powers[:-1]]
         valid = math.isfinite(y)
         e = min(max((abs(u - self.u_mean) - 0.05) / 0.05, 0.0), 1.0)
-        self.u_mean += min(0.02 * self.h, 1.0) * (u - self.u_mean)
+        if self.k >= 0:
+            w = np.exp([each.ln_w for each in self.filters])
+            rate = w @ [1.0 / (2.0 * each.lag_s) for each in self.filters] / w.sum()
+        else:
+            rate = math.inf
+        self.u_mean += self.h * min(rate, 0.02, 1.0 / self.h) * (u - self.u_mean)
         for each in self.filters:
             each.advance(self.powers)
         if self.k < 0 and not valid:

@@ -142,6 +142,7 @@ class Bank:
     hypotheses: Hypotheses = field(init=False, repr=False)
     constants: filters.Constants = field(init=False, repr=False)
     _arrivals: Mapping[int, Array] = field(init=False, repr=False)
+    _forgetting: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("u_min", "u_max"):
@@ -154,6 +155,7 @@ class Bank:
         object.__setattr__(self, "hypotheses", Hypotheses.at_period(self.period_s))
         object.__setattr__(self, "constants", filters.constants(self.hypotheses, *self.bounds))
         object.__setattr__(self, "_arrivals", _arrivals(self.hypotheses))
+        object.__setattr__(self, "_forgetting", evidence.forgetting(self.hypotheses))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -196,9 +198,13 @@ class Bank:
         """Return what a period of `applied` makes of `belief`, whatever will be read."""
         power = clamp(applied, self.u_min, self.u_max)
         way = path.pushed(belief.path, self.hypotheses, power)
-        excitation = belief.excitation.after(power, self.period_s)
         outlook, block = belief.outlook, belief.block
-        unrest = 0.0 if outlook is None else abs(power - outlook.holding_power)
+        if outlook is None:
+            memory_s = unrest = 0.0
+        else:
+            memory_s = 1.0 / float(belief.weights.share.dot(self._forgetting))
+            unrest = abs(power - outlook.holding_power)
+        excitation = belief.excitation.after(power, self.period_s, memory_s)
         if block is not None and belief.blind * self.period_s <= BLIND_S:
             block = self._predicted(block, way, belief.sample + 1, unrest)
         else:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 from thermoctl.control.adaptive import trial
 from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.coasting import Outlook, ahead, power_for
-from thermoctl.control.adaptive.filters import GAIN_MIN
+from thermoctl.control.adaptive.filters import GAIN_MAX, GAIN_MIN
 from thermoctl.control.adaptive.plant_belief import (
     gain,
     holding_power_sd,
@@ -33,9 +33,9 @@ RIDE_LAGS = 3.0
 UNKNOWN_S, UNKNOWN_PERIODS = 60.0, 10.0
 """After a longer gap nobody knows what was applied: commands expire."""
 
-DOUBTFUL_GAIN = 2.0 * GAIN_MIN
-"""With less at full power, in K/s, the gain rests on its bound: 200 l at 33 W, or no heater."""
-
+DOUBTFUL_LEAST, DOUBTFUL_MOST = 2.0 * GAIN_MIN, 0.9 * GAIN_MAX
+"""With less at full power, in K/s, the gain rests on its bound: 200 l at 33 W, or no heater. With
+more it rests on the other one, and power is too strong an answer to any error."""
 
 SDS_EVERY = 5
 """Standard deviations change slowly: they are reckoned anew after so many samples."""
@@ -254,7 +254,7 @@ class Adaptive:
     def remarks(self, belief: AdaptiveBelief) -> Mapping[str, str]:
         """Return whether power warms nothing, and the verdict on what was remembered."""
         remarks, memory = {}, belief.memory
-        if belief.doubt.stands:  # no heater, or one wired to cool
+        if belief.doubt.stands:  # no heater, one wired to cool, or one stronger than any plant's
             remarks["controller.gain_doubtful"] = belief.doubt.text
         if memory.verdict:
             remarks[memory.verdict] = memory.text
@@ -264,8 +264,11 @@ class Adaptive:
 def _doubt(outlook: Outlook | None) -> str:
     """Return what is doubtful of the gain, "" for nothing.
 
-    Told that power cools, the filters rest on their lower bound.
+    Told that power cools, the filters rest on their lower bound. On the upper one rests a plant
+    that is quicker than any they know.
     """
-    if outlook is None or outlook.gain > DOUBTFUL_GAIN:
+    if outlook is None or DOUBTFUL_LEAST < outlook.gain < DOUBTFUL_MOST:
         return ""
-    return f"expected more than {DOUBTFUL_GAIN:g} K/s at full power, learnt {outlook.gain:.2g}"
+    weak = outlook.gain <= DOUBTFUL_LEAST
+    expected = f"more than {DOUBTFUL_LEAST:g}" if weak else f"less than {DOUBTFUL_MOST:g}"
+    return f"expected {expected} K/s at full power, learnt {outlook.gain:.2g}"

@@ -61,7 +61,10 @@ class Noise(NamedTuple):
 DEAD_ZONE = 0.05
 """Power this close to its mean proves nothing. In quiet regulation ln S alone would speak, always
 for a small gain, and a small vessel drift to a wrong hypothesis."""
-_MEAN_PER_S = 0.02
+MEMORY_S, MEMORY_LAGS = 50.0, 2.0
+"""The mean is that of so long a time, and of so many lags where that is longer. What a move of the
+power proves is seen when its heat arrives: had the mean followed by then, nobody would listen. The
+first guess of a slow plant, slower yet, then steers so calmly that it is never put right."""
 
 
 class Excitation(NamedTuple):
@@ -70,7 +73,7 @@ class Excitation(NamedTuple):
     Parameters
     ----------
     mean_power : float
-        Running mean of the power over some 50 s.
+        Running mean of the power over `MEMORY_S`, or longer in a slow plant.
     share : float
         What the last sample counts as evidence, in [0, 1].
     """
@@ -78,11 +81,22 @@ class Excitation(NamedTuple):
     mean_power: float = 0.0
     share: float = 0.0
 
-    def after(self, power: float, period_s: float) -> Excitation:
-        """Return the excitation after a period of `power`."""
+    def after(self, power: float, period_s: float, memory_s: float = 0.0) -> Excitation:
+        """Return the excitation after a period of `power`, the mean being that of `memory_s`."""
         away = power - self.mean_power
         share = clamp((abs(away) - DEAD_ZONE) / DEAD_ZONE, 0.0, 1.0)
-        return Excitation(self.mean_power + min(_MEAN_PER_S * period_s, 1.0) * away, share)
+        return Excitation(
+            self.mean_power + period_s / max(memory_s, MEMORY_S, period_s) * away, share
+        )
+
+
+def forgetting(hypotheses: Hypotheses) -> Array:
+    """Return how much of the mean power each hypothesis would forget in a second, shape (n,).
+
+    It is these that are averaged and not the times: as long as a short lag is as likely as a long
+    one, the mean is that of a short time.
+    """
+    return 1.0 / (MEMORY_LAGS * hypotheses.lag_s)
 
 
 # -- outliers and jumps ---------------------------------------------------------------------------
