@@ -41,15 +41,21 @@ MEMORY_S, MEMORY_LAGS = 300.0, 10.0
 FOLLOWS_SDS = 4.0
 """They follow a rise beyond what full power does by noise of so many standard deviations: cut off,
 noise would no longer add up to nothing."""
-CREPT, CREPT_S = 0.12, 100.0
-"""A loss that has grown by so much of full power, for so long, while the reading has stood still: a
-sensor that shows the same for ever makes a controller add power little by little."""
+CREPT, CREPT_LEAST, CREPT_S = 0.12, 0.04, 100.0
+"""A loss that has doubled, but grown by no less and need not have grown by more of full power than
+these, for so long, while the reading has stood still: a sensor that shows the same for ever makes a
+controller add power little by little."""
+NEEDED_S = 150.0
+"""Memory of the power that the reading needs at the time."""
 CREPT_K = 0.3
 """That much it would have moved the reading meanwhile; less, nobody could see."""
 STANDS_K = 0.3
 """A reading this close to where it was has stood still."""
 COMPARED_FROM_S, COMPARED_S = 600.0, 21600.0
 """The loss it had is learnt for the first time, and forgotten over the second."""
+KEPT_K, KEPT_FROM_S = 1.5, 300.0
+"""Of a reading that has moved by no more it need not be learnt again: what a plant loses depends on
+its temperature, and is seen anew after so long."""
 SETTLE_S = 300.0
 """After a jump it is not known what the plant does without power."""
 COOLS_WITHIN_S = 1000.0
@@ -80,9 +86,9 @@ class HeatDoubt:
         self._rise_rate = 0.0
         self._known_s = 0.0
         self._level_c, self._coldest_c = math.nan, math.inf
-        self._stood_c = math.nan
-        self._stood_s = self._stood_power = 0.0
-        self._settle_s = 0.0
+        self._stood_c = self._proven_c = math.nan
+        self._stood_s = self._stood_power = self._proven_power = 0.0
+        self._settle_s = self._needed = self._needed_s = 0.0
         self.since: Seen | None = None
         self.clear()
 
@@ -91,9 +97,25 @@ class HeatDoubt:
         self._missing_k = self._extra_k = self._crept_s = 0.0
         self.since = None
 
-    def trust(self, gain: Gain) -> None:
+    def trust(self) -> None:
         """Take the loss for what it is now: the heater was asked, and answers."""
-        self._stood_power = self._holding(gain, self._stood_c)
+        self._stood_power = self._proven_power = self._needed
+
+    def distrust(self, gain: Gain, fell: float) -> None:
+        """Take for the loss no more than the reading `fell` without power, in K/s.
+
+        Of too few readings that is NaN, and says nothing.
+        """
+        if not math.isnan(fell):
+            self._rise_rate += max(self.loss(gain) - max(fell, 0.0), 0.0)
+
+    def begin(self, before: Seen, now: Seen) -> None:
+        """Learn the rates of a plant whose gain is not known yet.
+
+        Were the first that are taken those of the minute in which it became known, a heater that
+        had died by then would be one whose gain is all lost.
+        """
+        self._follow(before, now, now.reading_c - before.reading_c, 0.0)
 
     def loss(self, gain: Gain) -> float:
         """Return how fast the reading should fall without power, in K/s."""
@@ -119,9 +141,21 @@ class HeatDoubt:
         return self._extra_k > _limit_k(gain, sd_k, EXTRA_LAGS)
 
     def compare(
-        self, gain: Gain, block: Block, before: Seen, now: Seen, *, jumped: bool, follow: bool
+        self,
+        gain: Gain,
+        block: Block,
+        before: Seen,
+        now: Seen,
+        *,
+        jumped: bool,
+        follow: bool,
+        again: bool = False,
     ) -> None:
-        """Add what happened from `before` to `now`; quiet rates `follow` if they may."""
+        """Add what happened from `before` to `now`; quiet rates `follow` if they may.
+
+        After a bad answer, `again`, no loss has to be forgiven that has not been seen yet: of the
+        rise that is left by the loss, not of the heat, half may be missing.
+        """
         span_s, rise_k = now.t_s - before.t_s, now.reading_c - before.reading_c
         heat_k = gain.mean * (now.heat_s[gain.place] - before.heat_s[gain.place])
         full_k = gain.mean * span_s
@@ -129,7 +163,8 @@ class HeatDoubt:
         loss_k = self.loss(gain) * span_s
         loss_k += self._unseen(gain, now.reading_c) * span_s
         missing_k = clamp(heat_k - loss_k - rise_k, -2.0 * full_k, heat_k)
-        missing_k += self._missing_k - HALF * heat_k - FULL_SHARE * full_k
+        spared_k = HALF * (max(heat_k - loss_k, 0.0) if again else heat_k)
+        missing_k += self._missing_k - spared_k - FULL_SHARE * full_k
         if self._missing_k == 0.0:
             self.since = before
         self._missing_k = max(0.0, missing_k)
@@ -141,7 +176,9 @@ class HeatDoubt:
         if follow and not jumped and self.calm(gain, block.sd_k):
             most_k = full_k + FOLLOWS_SDS * block.sd_k
             self._follow(before, now, clamp(rise_k, -most_k, most_k), gain.lag_s)
-        self._creep(gain, now.reading_c, block)
+        if not again:  # what it needed is what it was asked about
+            self._need(gain, before, now)
+        self._creep(gain, now.reading_c, span_s, block.sd_k)
 
     def _unseen(self, gain: Gain, reading_c: float) -> float:
         """Return what a loss may have grown, or has surely shrunk, by since it was learnt."""
@@ -157,10 +194,6 @@ class HeatDoubt:
         """
         cools = SURE_SHARE * gain.cools_per_s * (reading_c - self._coldest_c)
         return min(self.loss(gain), max(cools, 0.0))
-
-    def _holding(self, gain: Gain, reading_c: float) -> float:
-        """Return the power that makes up for the loss at `reading_c`."""
-        return (self.loss(gain) + self._unseen(gain, reading_c)) / gain.mean
 
     def _follow(self, before: Seen, now: Seen, rise_k: float, lag_s: float) -> None:
         """Let the quiet rates follow those of a block."""
@@ -178,19 +211,40 @@ class HeatDoubt:
             self._level_c = now.reading_c
         self._level_c += share * (now.reading_c - self._level_c)
 
-    def _creep(self, gain: Gain, reading_c: float, block: Block) -> None:
+    def _need(self, gain: Gain, before: Seen, now: Seen) -> None:
+        """Learn which power the reading needs to stand still."""
+        span_s = now.t_s - before.t_s
+        heat_s = now.heat_s[gain.place] - before.heat_s[gain.place]
+        needed = (heat_s - (now.reading_c - before.reading_c) / gain.mean) / span_s
+        self._needed_s = min(self._needed_s + span_s, NEEDED_S)
+        self._needed += min(span_s / self._needed_s, 1.0) * (needed - self._needed)
+
+    def _creep(self, gain: Gain, reading_c: float, span_s: float, sd_k: float) -> None:
         """Notice a loss that grows while the reading stands still."""
-        power, span_s = self._holding(gain, reading_c), block.span_s
-        if not abs(reading_c - self._stood_c) < max(STANDS_K, SDS * block.sd_k):
-            self._stood_c, self._stood_s, self._stood_power = reading_c, 0.0, power
+        power = self._needed
+        if not abs(reading_c - self._stood_c) < max(STANDS_K, SDS * sd_k):
+            self._stand(gain, reading_c)
         self._stood_s += span_s
-        memory_s = COMPARED_S if self._stood_s > COMPARED_FROM_S else MEMORY_S
+        proven = self._stood_s > COMPARED_FROM_S
+        slowly = proven and power > self._stood_power
+        memory_s = COMPARED_S if slowly else MEMORY_S
         self._stood_power += min(span_s / memory_s, 1.0) * (power - self._stood_power)
+        if proven:
+            self._proven_c, self._proven_power = self._stood_c, self._stood_power
         grown = power - self._stood_power
-        least_k = max(CREPT_K, SDS * block.sd_k)
-        seen = self._stood_s > COMPARED_FROM_S and grown * gain.mean * MEMORY_S > least_k
-        crept = seen and grown > CREPT
+        least_k = max(CREPT_K, SDS * sd_k)
+        seen = proven and grown * gain.mean * MEMORY_S > least_k
+        crept = seen and grown > clamp(self._stood_power, CREPT_LEAST, CREPT)
         self._crept_s = self._crept_s + span_s if crept else 0.0
+
+    def _stand(self, gain: Gain, reading_c: float) -> None:
+        """Begin to stand at another reading, with the loss of the last one if it was near."""
+        above_k = reading_c - self._proven_c
+        self._stood_c, self._stood_s, self._stood_power = reading_c, 0.0, self._needed
+        if abs(above_k) < KEPT_K:
+            more = max(above_k, 0.0) * max(gain.cools_per_s, 1.0 / COOLS_WITHIN_S) / gain.mean
+            self._stood_s = COMPARED_FROM_S - KEPT_FROM_S
+            self._stood_power = self._proven_power + more
 
     def told(self, gain: Gain, now: Seen) -> str:
         """Return what was expected since the doubt began, and what came."""
@@ -198,7 +252,7 @@ class HeatDoubt:
         if self.crept:
             return (
                 f"expected about {self._stood_power:.0%} power to hold the reading, "
-                f"it took {self._holding(gain, now.reading_c):.0%}"
+                f"it took {self._needed:.0%}"
             )
         if since is None or not now.t_s > since.t_s:
             return "expected a reading that answers to the power"

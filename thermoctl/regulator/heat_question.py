@@ -34,6 +34,17 @@ USELESS = 0.1
 """A heater that does not make up for this share of the loss has no use that anybody could see."""
 WORTH_MOST = 0.95
 CAUTION = 1.5
+BEFORE_LAGS, BEFORE_S = 1.5, 16.0
+"""What was before the cut is looked at for so long."""
+CREPT_LAGS = 4.5
+"""So long where the reading has stood still: there is nothing to compare, were it shorter."""
+LONGEST_S, LONGEST_LAGS, LONGEST_SDS = 240.0, 12.0, 20.0
+"""A known heater that has not answered by then does not answer; nor before it would have warmed the
+water by so many standard deviations of a reading."""
+LIKELY = 1.0
+"""After so long noise is what hides the answer, and the likelier of two is taken: a heater that
+warms by as many standard deviations is not condemned."""
+_NOT_SEEN = Gain(math.nan, math.nan, 0)
 
 
 class Answer(Enum):
@@ -116,6 +127,71 @@ def of_unknown(found: Contrast, weakest: float, slope: float) -> tuple[Answer, G
     return (Answer.NOTHING if most < max(weakest, useless) else Answer.OPEN), shown
 
 
+def of_known_rows(
+    rows: Iterable[Seen], from_s: float, cut_s: float, known: Gain, sd_k: float, sure: float
+) -> tuple[Answer, Gain]:
+    """Return what `rows` since `from_s` say of a known heater.
+
+    Too few of them say nothing yet. An answer counts only if the reading turned the same way when
+    the power was cut, at `cut_s`.
+    """
+    meant = [row for row in rows if row.t_s >= from_s]
+    found = contrast(meant, sd_k)
+    if found is None:
+        return Answer.OPEN, _NOT_SEEN
+    answer, shown = of_known(found, known, sure)
+    less_sd_k = sd_k if sure < SURE else 0.0
+    recent_s = max(known.lag_s, BEFORE_S)
+    turns = turned(answer, meant, cut_s, recent_s, less_sd_k=less_sd_k)
+    return (answer if turns else Answer.OPEN), shown
+
+
+def of_unknown_rows(
+    rows: Iterable[Seen], from_s: float, cut_s: float, weakest: float, sd_k: float, *, whole: bool
+) -> tuple[Answer, Gain]:
+    """Return what `rows` since `from_s`, or the `whole`, say of an unknown heater.
+
+    An answer counts only if the reading turned the same way when the power was cut, at `cut_s`.
+    """
+    rows = list(rows)
+    meant = [row for row in rows if row.t_s >= from_s]
+    found = contrast(meant, sd_k)
+    if found is None:
+        return Answer.OPEN, _NOT_SEEN
+    drift = slope(meant, -math.inf)
+    answer, shown = of_unknown(found, weakest, drift)
+    found = contrast(rows, sd_k) if whole and answer is Answer.OPEN else None
+    if found is not None:
+        answer, shown = of_unknown(found, weakest, drift)
+    turns = turned(answer, meant, cut_s, 2.0 * BEFORE_S)
+    return (answer if turns else Answer.OPEN), shown
+
+
+def turned(
+    answer: Answer, rows: Iterable[Seen], cut_s: float, recent_s: float, *, less_sd_k: float = 0.0
+) -> bool:
+    """Return whether the reading turned the way of `answer` when the power was cut.
+
+    Parameters
+    ----------
+    answer : Answer
+        What is to be confirmed; what says nothing of a heater needs no turn.
+    rows : iterable of Seen
+        What was seen around the cut.
+    cut_s, recent_s : float
+        When it was, and how long before it, and before the end, is looked at, in s.
+    less_sd_k : float
+        Standard deviation of a reading: with it, the reading after the cut is judged by the least
+        slope that is still sure.
+    """
+    if answer not in (Answer.HEATS, Answer.COOLS):
+        return True
+    seen = list(rows)
+    before = slope(seen, cut_s - recent_s, cut_s)
+    after = slope(seen, max(seen[-1].t_s - recent_s, cut_s), less_sd_k=less_sd_k)
+    return after < before if answer is Answer.HEATS else after > before
+
+
 def slope(
     rows: Iterable[Seen], from_s: float, to_s: float = math.inf, *, less_sd_k: float = 0.0
 ) -> float:
@@ -143,3 +219,8 @@ def slope(
 def told_of(rate: float) -> str:
     """Return what is to be said of a reading that rises by `rate` in K/s."""
     return f"expected no rise without power, got {60.0 * rate:+.2f} K a minute"
+
+
+def longest_s(known: Gain, sd_k: float) -> float:
+    """Return how long the answer of a known heater is waited for."""
+    return max(LONGEST_S, LONGEST_LAGS * known.lag_s, LONGEST_SDS * sd_k / known.mean)

@@ -12,11 +12,12 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-from thermoctl.regulator import heat_question
+from thermoctl.regulator import heat_climb, heat_question
 from thermoctl.regulator.heat_blocks import Blocks, Repeats
 from thermoctl.regulator.heat_check import HeaterCheck
+from thermoctl.regulator.heat_climb import Climb
 from thermoctl.regulator.heat_doubt import HeatDoubt, Seen
-from thermoctl.regulator.heat_question import Answer
+from thermoctl.regulator.heat_question import BEFORE_LAGS, BEFORE_S, Answer
 from thermoctl.regulator.heat_response import LAGS_S, Block, Gain, HeatResponse
 from thermoctl.regulator.supervisor import Emit, Supervisor
 
@@ -32,17 +33,10 @@ OFF_LAGS = 1.5
 """After so many lags without power nothing is under way any more."""
 RISES = 0.3
 """A reading that rises by so much of what full power does, without any, is heated all the same."""
-BEFORE_LAGS, BEFORE_S = 1.5, 16.0
-"""What was before the cut is looked at for so long."""
-CREPT_LAGS = 4.5
-"""So long where the reading has stood still: there is nothing to compare, were it shorter."""
 HEARD_S, HEARD_LAGS = 20.0, 0.5
 """A good answer is believed from then on, of a heater that is not known, and of one that is;"""
 BAD_S, BAD_LAGS = 60.0, 2.0
 """a bad one from then on."""
-LONGEST_S, LONGEST_LAGS, LONGEST_SDS = 240.0, 12.0, 20.0
-"""A known heater that has not answered by then does not answer; nor before it would have warmed the
-water by so many standard deviations of a reading."""
 UNKNOWN_LAGS = 3.0
 """An unknown one gets another chance after so many of the longest lags, with twice the heat."""
 TRIALS_MOST = 8.0
@@ -53,7 +47,10 @@ CHANGED, AT_ONCE = 0.7, 3.0
 no more than so many times the old one at once."""
 WILD, RESTS = 1.3, 0.5
 """A reading that falls faster than a heater which cools this much better than it heated: ice in the
-water, or a sensor in the air. What follows the cut is then no answer; it is over at the second."""
+water, or a sensor in the air. What follows the cut is then no answer; it is over at the second.
+That nothing explains the fall is no answer either: the next heat has to be answered, and soon."""
+WILD_S = 60.0
+"""Such a fall is a doubt as soon as after a bad answer, once it lasts longer than water mixes."""
 NEARLY_FULL = 0.9
 """A heater that an earlier run knew has to show a rise only at so much power."""
 RECALLED_S = 600.0
@@ -63,13 +60,10 @@ LATELY_S = 1800.0
 ROWS = 450
 """Blocks that are remembered: half an hour at a second's period."""
 
-LIKELY = 1.0
-"""After so long noise is what hides the answer, and the likelier of two is taken: a heater that
-warms by as many standard deviations is not condemned."""
-
 _LIKELY_TEXT = "{:.0f} s without power do not show it surely, but a gain of {:.2g} K/s is likely"
-_WILD_TEXT = "the reading fell faster than any heater can make it, so the cut says nothing"
-_NOT_SEEN = Gain(math.nan, math.nan, 0)
+_WILD_TEXT = (
+    "the reading fell faster than any heater can make it: the next heat is what it is asked by"
+)
 _FAULTS = {"heater.no_response": 23, "heater.reversed": 3, "heater.stuck_on": 24}
 
 
@@ -104,7 +98,7 @@ class HeaterWatch:
         self._unknown_s = max(60.0, 10.0 * period_s)
         self._blocks = Blocks(period_s, 1.0 if check.action == "heat" else -1.0)
         self._repeats = Repeats()
-        self._response, self._doubt = HeatResponse(), HeatDoubt()
+        self._response, self._doubt, self._climb = HeatResponse(), HeatDoubt(), Climb()
         self._supervisor, self._emit = supervisor, emit
         self._known: Gain | None = None
         self._recalled = False  # whether that is of an earlier run, and not yet seen in this one
@@ -156,6 +150,7 @@ class HeaterWatch:
 
     def _lose_track(self) -> None:
         """After a long gap nobody knows what was applied."""
+        self._climb.clear()
         self._blocks.clear()
         self._response.begin_again()
         self._doubt.clear()
@@ -174,7 +169,7 @@ class HeaterWatch:
         known, sd_k = self._known, block.sd_k
         self._t_s += block.span_s
         self._off_s = self._off_s + block.span_s if block.power < OFF else 0.0
-        trusted = self._cut is None and self._distrusted_k <= 0.0
+        trusted = self._cut is None and self._distrusted_k <= 0.0 and self._climb.calm(sd_k)
         learns = trusted and (known is None or self._doubt.calm(known, sd_k))
         self._response.observe(block, learn=learns)
         if self._response.retracted and not self._recalled:
@@ -190,11 +185,25 @@ class HeaterWatch:
             return
         if learns:
             self._know(now)
-        if self._known is None or self._recalled:
+        if before is not None:
+            self._follow(block, before, now)
+        if self._cut is None and (self._known is None or self._recalled):
             self._try(block, now)
         settled = self._t_s >= self._settled_s and self._cut is None
         if self._known is not None and settled and before is not None:
             self._compare(self._known, block, before, now, t_s)
+
+    def _follow(self, block: Block, before: Seen, now: Seen) -> None:
+        """Follow a climb, of a heater that is known or not; ask it when it has stalled."""
+        known, climb, jumped = self._known, self._climb, self._response.jumped
+        climb.observe(known, block, before, now, jumped=jumped)
+        if known is None and not jumped and climb.calm(block.sd_k):
+            self._doubt.begin(before, now)
+        if climb.stalled(block.sd_k) and block.power >= OFF:
+            lag_s = 0.0 if known is None else known.lag_s
+            self._ask(
+                now, now.t_s - max(BEFORE_LAGS * lag_s, heat_climb.STALLED_S), climb.told(now)
+            )
 
     def _know(self, now: Seen) -> None:
         """Take what was learnt for known, once it is sure."""
@@ -232,21 +241,24 @@ class HeaterWatch:
             return
         doubt, sd_k, jumped = self._doubt, block.sd_k, self._response.jumped
         again = self._distrusted_k > 0.0
-        doubt.compare(known, block, before, now, jumped=jumped, follow=not again)
+        follow = not again and self._climb.calm(sd_k)
+        doubt.compare(known, block, before, now, jumped=jumped, follow=follow, again=again)
         if again and doubt.calm(known, sd_k):
-            place = known.place
-            self._distrusted_k -= known.mean * (now.heat_s[place] - before.heat_s[place])
+            heat_s = now.heat_s[known.place] - before.heat_s[known.place]
+            self._distrusted_k -= known.mean * heat_s
         hot = doubt.hot(known, sd_k) and not self._recalled  # less water is no fault
         if hot and self._off_s >= OFF_LAGS * self._longer_s(known):
-            rate = self._climb(known, now, sd_k)
+            rate = self._rising(known, now, sd_k)
             if rate > 0.0:  # nothing is proven while too few readings show a slope
                 self._fail("heater.stuck_on", heat_question.told_of(rate), t_s)
-        elif hot or (doubt.cold(known, sd_k, again=again) and block.power >= OFF):
-            lags = CREPT_LAGS if doubt.crept else BEFORE_LAGS
+        elif hot or (doubt.cold(known, sd_k, again=True) and block.power >= OFF):
+            lags = heat_question.CREPT_LAGS if doubt.crept else BEFORE_LAGS
             from_s = self._t_s - max(lags * known.lag_s, BEFORE_S)
             since_s = from_s if doubt.since is None else min(doubt.since.t_s, from_s)
             wild = self._wild(known, since_s, WILD) or self._wild(known, from_s, WILD)
-            self._ask(now, from_s, doubt.told(known, now), wild=wild)
+            lasts = wild and self._t_s - since_s >= max(BEFORE_LAGS * known.lag_s, WILD_S)
+            if hot or lasts or doubt.cold(known, sd_k, again=again):
+                self._ask(now, from_s, doubt.told(known, now), wild=wild)
 
     # -- a question ------------------------------------------------------------------------------
 
@@ -260,7 +272,7 @@ class HeaterWatch:
         lag_s = LAGS_S[-1] if known is None else self._longer_s(known)
         if known is not None and self._heated(known, now, block.sd_k, t_s):
             return
-        answer, shown = self._answer(cut, block.sd_k, now)
+        answer, shown = self._answer(cut, block.sd_k)
         heard_s = HEARD_S if known is None else HEARD_LAGS * lag_s
         bad_s = BAD_S if known is None else BAD_LAGS * lag_s
         if answer is Answer.HEATS:
@@ -271,20 +283,19 @@ class HeaterWatch:
         elif known is not None and cut.wild:
             if not self._wild(known, now.t_s - max(lag_s, BEFORE_S), RESTS):
                 self._emit("heater.answered", text=_WILD_TEXT)
-                self._go_on()
+                self._suspect(known)
         elif answer is not Answer.OPEN:
             self._refuse(answer, cut, shown, asked_s, t_s)
-        elif known is not None and asked_s > _longest_s(known, block.sd_k):
-            answer, shown = self._answer(cut, block.sd_k, now, sure=LIKELY)
+        elif known is not None and asked_s > heat_question.longest_s(known, block.sd_k):
+            answer, shown = self._answer(cut, block.sd_k, heat_question.LIKELY)
             if answer is Answer.HEATS:
                 self._emit("heater.answered", text=_LIKELY_TEXT.format(asked_s, shown.mean))
-                self._doubt.trust(known)
-                self._go_on()
+                self._trust()
             else:
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
         elif known is None and asked_s > UNKNOWN_LAGS * lag_s:
             if self._patience_s >= TRIALS_MOST * self._check.first_heat_s and not (
-                shown.mean > LIKELY * shown.sd
+                shown.mean > heat_question.LIKELY * shown.sd
             ):
                 self._failed_s = self._t_s  # asked often enough: nothing is left to be tried
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
@@ -293,45 +304,27 @@ class HeaterWatch:
             self._go_on()
 
     def _answer(
-        self, cut: _Cut, sd_k: float, now: Seen, sure: float = heat_question.SURE
+        self, cut: _Cut, sd_k: float, sure: float = heat_question.SURE
     ) -> tuple[Answer, Gain]:
-        """Return what the reading says so far, and the gain it shows.
-
-        An answer counts only if the reading turned the same way when the power was cut.
-        """
-        rows = [row for row in self._rows if row.t_s >= cut.from_s]
-        found = heat_question.contrast(rows, sd_k)
-        if found is None:
-            return Answer.OPEN, _NOT_SEEN
-        known = self._known
+        """Return what the reading says so far, and the gain it shows."""
+        known, climbed = self._known, heat_climb.SHOWS * self._climb.shown
         if known is not None:
-            answer, shown = heat_question.of_known(found, known, sure)
-            recent_s = max(known.lag_s, BEFORE_S)
-        else:
-            weakest, recent_s = self._check.weakest_k_per_s, 2.0 * BEFORE_S
-            drift = heat_question.slope(rows, -math.inf)
-            answer, shown = heat_question.of_unknown(found, weakest, drift)
-            whole = heat_question.contrast(list(self._rows), sd_k)
-            if answer is Answer.OPEN and whole is not None:
-                answer, shown = heat_question.of_unknown(whole, weakest, drift)
-        before = heat_question.slope(rows, cut.at_s - recent_s, cut.at_s)
-        less_sd_k = sd_k if sure < heat_question.SURE else 0.0
-        from_s = max(now.t_s - recent_s, cut.at_s)
-        after = heat_question.slope(rows, from_s, less_sd_k=less_sd_k)
-        turned = {Answer.HEATS: after < before, Answer.COOLS: after > before}
-        return (answer if turned.get(answer, True) else Answer.OPEN), shown
+            return heat_question.of_known_rows(self._rows, cut.from_s, cut.at_s, known, sd_k, sure)
+        weakest, whole = max(self._check.weakest_k_per_s, climbed), not climbed
+        of_unknown = heat_question.of_unknown_rows  # what has climbed may have failed since
+        return of_unknown(self._rows, cut.from_s, cut.at_s, weakest, sd_k, whole=whole)
 
     def _heated(self, known: Gain, now: Seen, sd_k: float, t_s: float) -> bool:
         """Return whether the reading has risen long after the power went, and latch that."""
         if self._off_s <= (OFF_LAGS + 1.0) * self._longer_s(known):
             return False
-        rate = self._climb(known, now, sd_k)
+        rate = self._rising(known, now, sd_k)
         heated = rate > RISES * known.mean
         if heated:
             self._fail("heater.stuck_on", heat_question.told_of(rate), t_s)
         return heated
 
-    def _climb(self, known: Gain, now: Seen, sd_k: float) -> float:
+    def _rising(self, known: Gain, now: Seen, sd_k: float) -> float:
         """Return how fast the reading surely rises, in K/s, when nothing is under way any more."""
         from_s = now.t_s - max(OFF_LAGS * known.lag_s, BEFORE_S)
         return heat_question.slope(self._rows, from_s, less_sd_k=sd_k)
@@ -352,9 +345,14 @@ class HeaterWatch:
         elif shown.mean > known.mean / CHANGED:
             self._known = known = known._replace(mean=min(shown.mean, AT_ONCE * known.mean))
         self._recalled = False
-        self._doubt.trust(known)
         self._patience_s = self._check.first_heat_s
         self._distrusted_k = 0.0
+        self._trust()
+
+    def _trust(self) -> None:
+        """Go on with a heater that heats; what made it doubtful is how the plant is now."""
+        self._doubt.trust()
+        self._climb.clear()
         self._go_on()
 
     def _refuse(self, answer: Answer, cut: _Cut, shown: Gain, asked_s: float, t_s: float) -> None:
@@ -384,17 +382,19 @@ class HeaterWatch:
             self._supervisor.latch(code, fault, text, t_s)
             if self._recalled:  # once it is mended, or acknowledged, it is a new one
                 self._known, self._recalled = None, False
+        self._suspect(self._known)
+
+    def _suspect(self, known: Gain | None) -> None:
+        """Go on with a heater that has to answer to its next heat, and soon: or it is latched."""
         self._failed_s, self._patience_s = self._t_s, self._check.first_heat_s
-        if self._known is not None:
-            self._distrusted_k = 2.0 * self._known.stored_k
+        if known is not None:
+            self._distrusted_k = 2.0 * known.stored_k
+            from_s = self._t_s - max(known.lag_s, BEFORE_S)
+            self._doubt.distrust(known, -heat_question.slope(self._rows, from_s))
         self._go_on()
 
     def _go_on(self) -> None:
         self._cut = None
+        self._climb.pause()
         self._doubt.clear()
         self._begin_trial()
-
-
-def _longest_s(known: Gain, sd_k: float) -> float:
-    """Return how long the answer of a known heater is waited for."""
-    return max(LONGEST_S, LONGEST_LAGS * known.lag_s, LONGEST_SDS * sd_k / known.mean)
