@@ -82,7 +82,7 @@ class Excitation(NamedTuple):
     share: float = 0.0
 
     def after(self, power: float, period_s: float, memory_s: float = 0.0) -> Excitation:
-        """Return the excitation after a period of `power`, the mean being that of `memory_s`."""
+        """Return the excitation after a period of `power`; the mean is of `memory_s`."""
         away = power - self.mean_power
         share = clamp((abs(away) - DEAD_ZONE) / DEAD_ZONE, 0.0, 1.0)
         return Excitation(
@@ -91,7 +91,7 @@ class Excitation(NamedTuple):
 
 
 def forgetting(hypotheses: Hypotheses) -> Array:
-    """Return how much of the mean power each hypothesis would forget in a second, shape (n,).
+    """Return what each hypothesis would forget of the mean power in a second.
 
     It is these that are averaged and not the times: as long as a short lag is as likely as a long
     one, the mean is that of a short time.
