@@ -236,9 +236,8 @@ class HeaterWatch:
 
     def _compare(self, known: Gain, block: Block, before: Seen, now: Seen, t_s: float) -> None:
         """Compare what a known heater should have done with what came."""
-        sure = self._recalled or self._t_s > RECALLED_S  # of the lag
-        if sure and self._heated(known, now, block.sd_k, t_s):
-            return
+        if self._recalled and self._heated(known, now, block.sd_k, t_s):
+            return  # of any other it would have to be sure of the lag, too
         doubt, sd_k, jumped = self._doubt, block.sd_k, self._response.jumped
         again = self._distrusted_k > 0.0
         follow = not again and self._climb.calm(sd_k)
