@@ -103,8 +103,8 @@ def settled_s(cycles):
 
 SLOWER = pytest.mark.xfail(
     strict=True,
-    reason="evidence of a plant thought quick is forgotten too soon for one three times as slow; "
-    "measured 697 s",
+    reason="since power is heard for longer (decision 30) it takes 697 s, and passes by nothing; "
+    "before it took 668",
 )
 
 
