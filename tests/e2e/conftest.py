@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -11,6 +12,11 @@ import pytest
 
 AQUARIUM = (Path(__file__).parents[2] / "config" / "aquarium.toml").read_text()
 PATIENCE_S = 15.0
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # Whoever runs the tests in the background ignores Ctrl-C, and a program that they start would
+    # inherit that and never be interrupted.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class DaemonProcess:
