@@ -8,6 +8,7 @@ Run as ``python docs/make_configuration.py``. A line ``<!-- table: NAME -->`` be
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from thermoctl.app import plugins
@@ -28,13 +29,24 @@ def rows(name: str) -> list[Row]:
         settings = rows_of_model(plugins.find(plugins.DRIVERS, kind).Settings)
         return [row for row in settings if row.key != "kind"]
     if what in ("controller", "estimator"):
-        return rows_of_law(plugins.find(f"thermoctl.{what}s", kind))
+        return [each for each in rows_of_law(_law(what, kind)) if "." not in each.key]
+    if what == "constants":
+        return [each for each in rows_of_law(_law("controller", kind)) if "." in each.key]
     return rows_of_model(getattr(tables, name))
 
 
+def _law(what: str, kind: str) -> type:
+    law: type = plugins.find(f"thermoctl.{what}s", kind)
+    return law
+
+
 def table(name: str) -> str:
-    """Return the table called `name` as Markdown."""
-    return "\n" + HEAD + "".join(f"{line(row)}\n" for row in rows(name)) + "\n"
+    """Return the table called `name` as Markdown; keys that share a text show it once."""
+    each, text = [], ""
+    for row in rows(name):
+        each.append(line(replace(row, text="as above") if row.text == text else row))
+        text = row.text
+    return "\n" + HEAD + "".join(f"{row}\n" for row in each) + "\n"
 
 
 def line(row: Row) -> str:

@@ -116,6 +116,16 @@ def blamed(error: Exception, known: Iterable[str]) -> BadOption:
     return BadOption(rest, (first,)) if first in set(known) else BadOption(text)
 
 
+def _within(name: str, group: Any, options: Any) -> Any:
+    """Return the options of `group` that stand in the table `name`, within that of the law."""
+    if not isinstance(options, Mapping):
+        raise BadOption(f"expected a table, got {options!r}", (name,))
+    try:
+        return build(group, options)
+    except BadOption as error:
+        raise BadOption(error.text, (name, *error.path)) from error
+
+
 def _is_required(field: dataclasses.Field[Any]) -> bool:
     return field.default is field.default_factory is dataclasses.MISSING
 
@@ -125,6 +135,8 @@ def _accepted(law: type, known: Iterable[str], name: str, value: Any) -> Any:
     if name not in known:
         raise BadOption(f"unknown key{nearest(name, known)}", (name,))
     hint = get_type_hints(law)[name]
+    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+        return value if isinstance(value, hint) else _within(name, hint, value)
     given = tuple(value) if isinstance(value, list) and get_origin(hint) is tuple else value
     try:
         return TypeAdapter(hint, config={"arbitrary_types_allowed": True}).validate_python(

@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from thermoctl.control.adaptive import filters
 from thermoctl.control.adaptive import path as path_room
 from thermoctl.control.adaptive.bank import BLIND_S, Bank
-from thermoctl.control.adaptive.coasting import SMOOTHNESS, Outlook, power_for
+from thermoctl.control.adaptive.coasting import Outlook, power_for
+from thermoctl.control.adaptive.constants import Lags, Pace, Plants
 from thermoctl.control.adaptive.evidence import Excitation, Gate, Noise
-from thermoctl.control.adaptive.filters import BETA, GAIN_MAX, GAIN_MIN, D, T, X, Z
-from thermoctl.control.adaptive.hypotheses import LAGS, Hypotheses
+from thermoctl.control.adaptive.filters import BETA, D, T, X, Z
+from thermoctl.control.adaptive.hypotheses import Hypotheses
 
 BANK = Bank()
 
@@ -122,8 +123,8 @@ def test_whatever_finite_readings_come_a_power_follows(samples, period_s):
                 0.0 <= power_for(belief.outlook, 37.5, 0.6, period_s, bank.bounds, applied) <= 1.0
             )
             x = belief.block[:, X]
-            assert (x[BETA] >= GAIN_MIN * period_s).all()
-            assert (x[BETA] <= GAIN_MAX * period_s).all()
+            assert (x[BETA] >= bank.plants.gain_min_k_per_s * period_s).all()
+            assert (x[BETA] <= bank.plants.gain_max_k_per_s * period_s).all()
     assert (belief.outlook is None) == (not any(math.isfinite(y) for y, _ in samples))
 
 
@@ -177,7 +178,7 @@ def test_a_jump_inflates_water_and_sensor_and_leaves_gain_and_loss_known():
 
 def of_lags(belief):
     """Return the weight of every lag, all shapes together."""
-    return belief.weights.share.reshape(LAGS, -1).sum(axis=1)
+    return belief.weights.share.reshape(Lags().count, -1).sum(axis=1)
 
 
 def test_no_evidence_about_lags_is_heard_for_five_of_them_after_a_jump():
@@ -208,7 +209,7 @@ def test_water_that_jumps_tells_a_slow_sensor_from_a_slow_heater(heater_s, senso
         water += 0.036 * q - 0.009
         sensor += (1.0 - math.exp(-1.0 / sensor_s)) * (water - sensor)
         y = sensor + 0.01 * rng.standard_normal()
-        shares.append(belief.weights.share.reshape(LAGS, -1).sum(axis=0)[shape])
+        shares.append(belief.weights.share.reshape(Lags().count, -1).sum(axis=0)[shape])
     assert shares[399] < 0.9  # until then, it is a guess
     assert shares[440] > 0.99
 
@@ -217,7 +218,7 @@ def test_when_the_heat_has_arrived_gain_and_loss_are_uncertain_together():
     belief, _ = warmed(60)
     block, due = belief.block.copy(), BANK.hypotheses.lag_s < 30.0
     before, heat = block.copy(), belief.path.heat
-    filters.loosened(block, heat, due)
+    filters.loosened(block, heat, 0.08 * due)
     changed = np.zeros((4, 5), dtype=bool)
     changed[D:, D:X] = True
     assert np.array_equal(block[~changed], before[~changed])
@@ -235,7 +236,7 @@ def test_the_loss_may_drift_faster_while_the_power_is_far_from_what_holds_the_wa
         filters.predicted(block, heat, BANK.constants, unrest)[D, D] - block[D, D]
         for unrest in (0.0, 0.8)
     )
-    assert restless / calm == pytest.approx(np.full(len(h), (1.0 + filters.UNREST * 0.8) ** 2))
+    assert restless / calm == pytest.approx(np.full(len(h), (1.0 + Plants().unrest * 0.8) ** 2))
 
 
 def test_after_a_long_gap_the_water_begins_anew_and_the_gain_is_kept():
@@ -354,7 +355,7 @@ def test_an_error_is_to_be_removed_within_tc(lag_s, calmness, period_s, Tc_s):
     for _ in range(400):
         now = outlook._replace(coasting_c=coasting_c)
         power = power_for(now, 37.5, calmness, period_s, (-9.0, 9.0), before)
-        under_way = 0.036 * SMOOTHNESS * Tc_s * (power - 0.2)  # of the power's own lag
+        under_way = 0.036 * Pace().smoothness * Tc_s * (power - 0.2)  # of the power's own lag
         coasting_c += 0.036 * period_s * (power - 0.2)
         left_k.append(37.5 - coasting_c - under_way)
         before = power
@@ -386,7 +387,7 @@ def test_power_that_has_far_to_go_is_at_its_limit_at_once_and_noise_moves_it_lit
     noisy = cold._replace(coasting_c=37.495)
     unsmoothed = 0.005 / (0.036 * 0.4 * 20.0)
     moved = power_for(noisy, 37.5, 0.4, 1.0, (0.0, 1.0), before=0.2) - 0.2
-    assert moved == pytest.approx(unsmoothed / (1.0 + SMOOTHNESS * 8.0))
+    assert moved == pytest.approx(unsmoothed / (1.0 + Pace().smoothness * 8.0))
 
 
 @pytest.mark.parametrize(
@@ -396,7 +397,7 @@ def test_with_much_heat_under_way_the_power_is_calmer_up_to_three_times(lag_s, g
     near = Outlook(coasting_c=37.4, holding_power=0.2, lag_s=lag_s, gain=gain)
     Tc_s = times * 0.4 * lag_s
     moved = power_for(near, 37.5, 0.4, 1.0, (-9.0, 9.0), before=0.2) - 0.2
-    assert moved == pytest.approx(0.1 / (gain * Tc_s) / (1.0 + SMOOTHNESS * Tc_s))
+    assert moved == pytest.approx(0.1 / (gain * Tc_s) / (1.0 + Pace().smoothness * Tc_s))
 
 
 def counted(surplus, gain=0.036, least=0.0):
@@ -404,7 +405,7 @@ def counted(surplus, gain=0.036, least=0.0):
     near = Outlook(37.5, 0.5, 20.0, gain, heater_k=gain)
     asked = power_for(near._replace(surplus=surplus), 37.5, 0.4, 1.0, (least, 1.0), before=0.5)
     Tc_s = 0.4 * 20.0 * min(max(gain * 20.0 / 1.2, 1.0), 3.0)
-    return surplus - (asked - 0.5) * (1.0 + SMOOTHNESS * Tc_s) * Tc_s
+    return surplus - (asked - 0.5) * (1.0 + Pace().smoothness * Tc_s) * Tc_s
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -428,7 +429,7 @@ def test_what_hypotheses_do_not_agree_upon_is_not_acted_on(off_k, bounds, left_k
     told = Outlook(37.5 + off_k, 0.2, 20.0, 0.12, spread_k=0.25)
     Tc_s = 2.0 * 0.4 * 20.0
     moved = power_for(told, 37.5, 0.4, 1.0, bounds, before=0.2) - 0.2
-    assert moved == pytest.approx(left_k / (0.12 * Tc_s * (1.0 + SMOOTHNESS * Tc_s)))
+    assert moved == pytest.approx(left_k / (0.12 * Tc_s * (1.0 + Pace().smoothness * Tc_s)))
 
 
 def test_the_spread_is_that_of_the_coasting_temperatures():
@@ -448,7 +449,9 @@ def test_within_a_period_heater_and_sensor_are_those_of_a_hundred_short_ones(per
     h, fine = Hypotheses.at_period(period_s), Hypotheses.at_period(period_s / 100.0)
     block = filters.start(h, 25.0)
     way = path_room.pushed(path_room.at_rest(h), replace(h, dead=np.zeros_like(h.dead)), 1.0)
-    water, sensor = filters.predicted(block, way.mean, filters.constants(h, 0.0, 1.0))[:2, X] - 25.0
+    water, sensor = (
+        filters.predicted(block, way.mean, filters.per_period(h, Plants(), 0.0, 1.0))[:2, X] - 25.0
+    )
     q, heat, shown = np.zeros((3, len(h)))
     for k in range(100):
         before, q = q, q + fine.element_step * (1.0 - q)
@@ -463,10 +466,10 @@ def test_a_known_gain_moves_by_the_share_of_the_proof_and_stays_that_much_less_s
     belief, y = warmed()
     block = belief.block.copy()
     block[BETA, BETA, ::2] += 0.05**2
-    unknown = block[BETA, BETA] > (filters.KNOWN_SHARE * block[BETA, X]) ** 2
+    unknown = block[BETA, BETA] > (Plants().known_share * block[BETA, X]) ** 2
     assert 10 < unknown.sum() < len(unknown) - 10
-    whole, _, _ = filters.corrected(block, y + 0.03, 1e-4)
-    part, _, _ = filters.corrected(block, y + 0.03, 1e-4, proof)
+    whole, _, _ = filters.corrected(block, y + 0.03, 1e-4, BANK.constants)
+    part, _, _ = filters.corrected(block, y + 0.03, 1e-4, BANK.constants, proof)
     assert np.array_equal(part[..., unknown], whole[..., unknown])
     same = np.ones((4, 5), dtype=bool)
     same[BETA, [BETA, X]] = False

@@ -7,7 +7,8 @@ import pytest
 
 from thermoctl.control.adaptive import Adaptive
 from thermoctl.control.adaptive.bank import Bank
-from thermoctl.control.adaptive.coasting import SMOOTHNESS, power_for
+from thermoctl.control.adaptive.coasting import power_for
+from thermoctl.control.adaptive.constants import Pace
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
 from thermoctl.signals import PlantBelief
@@ -85,7 +86,7 @@ def test_calmness_divides_the_power_an_error_is_met_with():
         now = situation(37.5, 0.2, outlook.coasting_c + 0.02)
         more = Adaptive(calmness=calmness).decide(belief, now)[1] - outlook.holding_power
         Tc_s = calmness * outlook.lag_s
-        aims.append(more * (1.0 + SMOOTHNESS * Tc_s) * Tc_s * outlook.gain)
+        aims.append(more * (1.0 + Pace().smoothness * Tc_s) * Tc_s * outlook.gain)
     assert aims == pytest.approx([0.02] * 3)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from thermoctl.control.adaptive.bank import Bank
-from thermoctl.control.adaptive.coasting import FASTEST_PERIODS, power_for
+from thermoctl.control.adaptive.coasting import power_for
 
 SHAPES = [(0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.05, 0.10, 0.85)]
 
@@ -196,7 +196,7 @@ class PlainBank:
         u_ss, coasting, lag, beta, heater, surplus = self.told
         spread = math.sqrt(w @ (rows[:, 1] - coasting) ** 2 / w.sum())
         heavy = min(max(beta * lag / 1.2, 1.0), 3.0)
-        Tc = max(3.0, FASTEST_PERIODS * self.h, self.kappa * heavy * lag)
+        Tc = max(3.0, 1.5 * self.h, self.kappa * heavy * lag)
         tau, before = 0.4 * Tc, self.powers[0]
         aim = coasting + beta * tau * (before - u_ss)
         swing = min(max(beta * lag * (self.u_max - self.u_min) / 1.2, 1.0), 3.0)

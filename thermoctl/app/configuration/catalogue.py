@@ -65,8 +65,16 @@ def rows_of_model(model: type[BaseModel]) -> list[Row]:
 
 
 def rows_of_law(law: type) -> list[Row]:
-    """Return a row for each option of a controller or an estimator."""
-    return [_row(key, each, {}, "default" not in each) for key, each in option_schemas(law).items()]
+    """Return a row for each option of a controller or an estimator; of a table, for its keys."""
+    return list(_rows("", option_schemas(law)))
+
+
+def _rows(above: str, options: Mapping[str, Any]) -> Iterable[Row]:
+    for key, each in options.items():
+        if "properties" in each:
+            yield from _rows(f"{above}{key}.", each["properties"])
+        else:
+            yield _row(f"{above}{key}", each, {}, "default" not in each)
 
 
 def option_schemas(law: type) -> dict[str, dict[str, Any]]:
@@ -77,11 +85,25 @@ def option_schemas(law: type) -> dict[str, dict[str, Any]]:
         if field.name in INJECTED or not field.init:
             continue
         hint = float if float in get_args(hints[field.name]) else hints[field.name]
-        schemas[field.name] = TypeAdapter(hint).json_schema()
+        if dataclasses.is_dataclass(hint):
+            schemas[field.name] = _table_schema(hint)
+            continue
+        schemas[field.name] = TypeAdapter(hint).json_schema() | dict(field.metadata)
         schemas[field.name]["description"] = texts.get(field.name, "")
         if field.default is not dataclasses.MISSING:
             schemas[field.name]["default"] = field.default
     return schemas
+
+
+def _table_schema(group: Any) -> dict[str, Any]:
+    """Return the JSON schema of options that stand in a table of their own."""
+    return {
+        "type": "object",
+        "description": first_line(group),
+        "default": {},
+        "properties": option_schemas(group),
+        "additionalProperties": False,
+    }
 
 
 def parameter_texts(law: type) -> dict[str, str]:

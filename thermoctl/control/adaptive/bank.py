@@ -17,13 +17,10 @@ import numpy as np
 
 from thermoctl.control.adaptive import evidence, filters, path
 from thermoctl.control.adaptive.coasting import Outlook, outlook
+from thermoctl.control.adaptive.constants import Hearing, Lags, Plants
 from thermoctl.control.adaptive.evidence import (
     EVIDENCE_FROM,
-    GATE,
     GATE_SAMPLES,
-    HOLD_LAGS,
-    QUIET_LAGS,
-    QUIET_POWER,
     QUIET_SAMPLES,
     Drifting,
     Excitation,
@@ -129,6 +126,8 @@ class Bank:
         Time from one sample to the next, .05 to 3,600 s.
     u_min, u_max : float
         Least and most power: at most 0, and above it.
+    lags, plants, hearing : Lags, Plants, Hearing
+        The constants of hypotheses, filters and evidence.
 
     Raises
     ------
@@ -139,8 +138,11 @@ class Bank:
     period_s: float = 1.0
     u_min: float = 0.0
     u_max: float = 1.0
+    lags: Lags = field(default_factory=Lags)
+    plants: Plants = field(default_factory=Plants)
+    hearing: Hearing = field(default_factory=Hearing)
     hypotheses: Hypotheses = field(init=False, repr=False)
-    constants: filters.Constants = field(init=False, repr=False)
+    constants: filters.PerPeriod = field(init=False, repr=False)
     _arrivals: Mapping[int, Array] = field(init=False, repr=False)
     _forgetting: Array = field(init=False, repr=False)
 
@@ -152,10 +154,12 @@ class Bank:
             raise ValueError(f"u_min must be at most 0, got {self.u_min!r}")
         if self.u_max <= 0.0:
             raise ValueError(f"u_max must be positive, got {self.u_max!r}")
-        object.__setattr__(self, "hypotheses", Hypotheses.at_period(self.period_s))
-        object.__setattr__(self, "constants", filters.constants(self.hypotheses, *self.bounds))
-        object.__setattr__(self, "_arrivals", _arrivals(self.hypotheses))
-        object.__setattr__(self, "_forgetting", evidence.forgetting(self.hypotheses))
+        hypotheses = Hypotheses.at_period(self.period_s, self.lags)
+        constants = filters.per_period(hypotheses, self.plants, *self.bounds)
+        object.__setattr__(self, "hypotheses", hypotheses)
+        object.__setattr__(self, "constants", constants)
+        object.__setattr__(self, "_arrivals", _arrivals(hypotheses, self.plants))
+        object.__setattr__(self, "_forgetting", evidence.forgetting(hypotheses, self.hearing))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -204,7 +208,7 @@ class Bank:
         else:
             memory_s = 1.0 / float(belief.weights.share.dot(self._forgetting))
             unrest = abs(power - outlook.holding_power)
-        excitation = belief.excitation.after(power, self.period_s, memory_s)
+        excitation = belief.excitation.after(power, self.period_s, memory_s, self.hearing)
         if block is not None and belief.blind * self.period_s <= BLIND_S:
             block = self._predicted(block, way, belief.sample + 1, unrest)
         else:
@@ -274,24 +278,26 @@ class Bank:
         R, m = noise.believed, weights.likeliest
         nu, S_m = y_c - float(block[Z, X, m]), float(block[Z, Z, m]) + R
         lag = float(self.hypotheses.lag_s[m]) / self.period_s
-        outside = belief.noise.samples >= GATE_SAMPLES and nu * nu > GATE * S_m
-        gate = belief.gate.beyond(sample, HOLD_LAGS * lag) if outside else belief.gate.within()
+        hearing = self.hearing
+        hold, gate_sds = hearing.hold_lags * lag, hearing.gate_sds
+        outside = belief.noise.samples >= GATE_SAMPLES and nu * nu > gate_sds * gate_sds * S_m
+        gate = belief.gate.beyond(sample, hold) if outside else belief.gate.within()
         if gate.outlier:
             return Met(noise, gate, weights, drifting, heard, surprise_k, block)
         if sample >= drifting.silent_until:
-            still = share == 0.0 and ahead.unrest < QUIET_POWER
-            rest = max(QUIET_LAGS * lag, QUIET_SAMPLES)
-            drifting = drifting.after(still, nu / math.sqrt(S_m), rest)
+            still = share == 0.0 and ahead.unrest < hearing.quiet_power
+            rest = max(hearing.quiet_lags * lag, QUIET_SAMPLES)
+            drifting = drifting.after(still, nu / math.sqrt(S_m), rest, hearing)
         if gate.jumped:
             block = filters.inflated(block, nu, R)
             drifting = Drifting(silent_until=gate.silent_until, disturbed=True)
         elif drifting.found:
-            block = filters.reopened(block)
-            drifting = Drifting(silent_until=sample + HOLD_LAGS * lag, disturbed=True)
+            block = filters.reopened(block, self.plants.reopened_share)
+            drifting = Drifting(silent_until=sample + hold, disturbed=True)
         water_c = block[T, X]
-        block, nis, S = filters.corrected(block, y_c, R, share)
+        block, nis, S = filters.corrected(block, y_c, R, self.constants, share)
         if sample < gate.silent_until:  # what was poured in is colder, and loses less
-            filters.grown(block, block[T, X] - water_c)
+            filters.grown(block, block[T, X] - water_c, self.constants)
         filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
         silent_until = max(EVIDENCE_FROM, gate.silent_until, drifting.silent_until)
         if share > 0.0 and sample >= silent_until and not drifting.suspected:
@@ -301,7 +307,10 @@ class Bank:
         return Met(noise, gate, weights, drifting, heard, surprise_k, block)
 
 
-def _arrivals(hypotheses: Hypotheses) -> Mapping[int, Array]:
-    """Return, by sample, under which hypotheses the heat has just arrived."""
-    samples = np.floor(filters.LOSS_LAGS * hypotheses.lag_s / hypotheses.period_s) + 1.0
-    return {int(sample): samples == sample for sample in np.unique(samples)}
+def _arrivals(hypotheses: Hypotheses, plants: Plants) -> Mapping[int, Array]:
+    """Return, by sample, how much is loosened where the heat has just arrived."""
+    lags = hypotheses.lag_s / hypotheses.period_s
+    samples = np.floor(plants.loosened_lags * lags) + 1.0
+    return {
+        int(sample): plants.loosened_share * (samples == sample) for sample in np.unique(samples)
+    }

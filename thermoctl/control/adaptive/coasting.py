@@ -32,37 +32,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thermoctl.control.adaptive.filters import BETA, Block, Constants, D, T, X
+from thermoctl.control.adaptive.constants import Pace
+from thermoctl.control.adaptive.filters import BETA, Block, D, PerPeriod, T, X
 from thermoctl.control.adaptive.hypotheses import Hypotheses
 from thermoctl.control.adaptive.path import Path
 from thermoctl.quantities import Array, clamp
 
-FASTEST_S = 3.0
-"""Tc is no shorter, whatever the lag."""
-FASTEST_PERIODS = 1.5
-"""Nor shorter than so many samples: at one sample any error of the gain would be given back whole,
-and below it the loop would be unstable."""
-HEAVY_K, CALMER = 1.2, 3.0
-"""Where full power puts more than so many kelvin on their way within a lag, each tenth by which the
-lag is mistaken is that much overshoot: Tc grows by as much, and no more than so many times."""
-SMOOTHNESS = 0.4
-"""The lag of the power itself, as a share of Tc. Noise costs a good deal less travel than at once,
-while a power that has far to go is at its limit at once all the same."""
-
-CARRIED, EVEN = 0.4, 2.0
-"""On the move so much of the heat in the heater is left out of account. Were all of it counted, the
-error would go by Tc and the water follow as slowly as the heater; so both go at one pace, damped by
-some .85. A lag that is mistaken then costs more: where the range of power has so many times
-`HEAVY_K` under way all of that heat counts, and beyond it even more."""
-AT_REST, REST = 2.2, 0.08
-"""Within so small a surplus of power that heat counts so many times. At rest it is the answer to
-noise that has passed, and what is taken back of it need not be cooled away."""
-VAGUE, VAGUE_MOST = 0.25, 0.05
-"""A gain is taken to be larger by what its deviation, .05 K/s of it at most, exceeds a quarter of
-it. Else a start in water that is nearly warm would ask for all the power there is."""
-CAUTION, AGREED_K = 1.0, 0.05
-"""An error is acted on but for so many standard deviations among the hypotheses beyond the latter.
-What they disagree in is heat on its way. When it has arrived they agree: nothing waits for ever."""
+USUAL = Pace()
 
 
 class Outlook(NamedTuple):
@@ -99,7 +75,7 @@ class Outlook(NamedTuple):
 
 
 def outlook(
-    block: Block, path: Path, share: Array, hypotheses: Hypotheses, constants: Constants
+    block: Block, path: Path, share: Array, hypotheses: Hypotheses, constants: PerPeriod
 ) -> Outlook:
     """Return the means over the hypotheses, weighted by `share`."""
     h, mean = hypotheses.period_s, share.dot
@@ -131,6 +107,7 @@ def power_for(
     bounds: tuple[float, float],
     before: float,
     ramp_power: float = 0.0,
+    pace: Pace = USUAL,
 ) -> float:
     """Return the power that lets the water come to rest at the set point within Tc.
 
@@ -150,37 +127,45 @@ def power_for(
         Power of the last period, as it was applied.
     ramp_power : float
         What lets the water rise with a ramp, beside the holding power.
+    pace : Pace
+        The constants of this law.
     """
     full_k = outlook.gain * outlook.lag_s
-    heavy = clamp(full_k / HEAVY_K, 1.0, CALMER)
-    Tc_s = max(FASTEST_S, FASTEST_PERIODS * period_s, calmness * heavy * outlook.lag_s)
-    tau_s = SMOOTHNESS * Tc_s
+    heavy = clamp(full_k / pace.heavy_k, 1.0, pace.calmer)
+    fastest_s = max(pace.fastest_s, pace.fastest_periods * period_s)
+    Tc_s = max(fastest_s, calmness * heavy * outlook.lag_s)
+    tau_s = pace.smoothness * Tc_s
     resting = outlook.holding_power + ramp_power
     aim_c = outlook.coasting_c + outlook.gain * tau_s * (before - resting)
     surplus = outlook.surplus - ramp_power
-    aim_c += outlook.heater_k * (_counted(surplus, full_k * (bounds[1] - bounds[0])) - surplus)
-    error_k = _agreed(setpoint_c - aim_c, outlook.spread_k, bounds)
-    gain = outlook.gain + max(min(outlook.gain_sd, VAGUE_MOST) - VAGUE * outlook.gain, 0.0)
+    swing_k = full_k * (bounds[1] - bounds[0])
+    aim_c += outlook.heater_k * (_counted(surplus, swing_k, pace) - surplus)
+    error_k = _agreed(setpoint_c - aim_c, outlook.spread_k, bounds, pace)
+    gain_sd = min(outlook.gain_sd, pace.vague_k_per_s)
+    gain = outlook.gain + max(gain_sd - pace.vague_share * outlook.gain, 0.0)
     wanted = resting + error_k / (gain * Tc_s)
     return clamp(before + (wanted - before) * period_s / (period_s + tau_s), *bounds)
 
 
-def _counted(surplus: float, swing_k: float) -> float:
+def _counted(surplus: float, swing_k: float, pace: Pace) -> float:
     """Return as how much a surplus of power in the heater counts.
 
     `swing_k` is what the whole range of power has under way within a lag; a cooler adds to it.
     """
-    moving = 1.0 + CARRIED * (clamp(swing_k / HEAVY_K, 1.0, CALMER) - EVEN)
+    heavy = clamp(swing_k / pace.heavy_k, 1.0, pace.calmer)
+    moving, resting = 1.0 + pace.left_out * (heavy - pace.even), pace.resting
     size = abs(surplus)
-    return math.copysign(max(moving * size, min(AT_REST * size, AT_REST * REST)), surplus)
+    return math.copysign(
+        max(moving * size, min(resting * size, resting * pace.rest_power)), surplus
+    )
 
 
-def _agreed(error_k: float, spread_k: float, bounds: tuple[float, float]) -> float:
+def _agreed(error_k: float, spread_k: float, bounds: tuple[float, float], pace: Pace) -> float:
     """Return what is left of an error on whose size the hypotheses do not agree.
 
     Where power can only heat, water that is too hot is so whatever they say.
     """
-    doubt_k = CAUTION * max(spread_k - AGREED_K, 0.0)
+    doubt_k = pace.caution * max(spread_k - pace.agreed_k, 0.0)
     if error_k < 0.0 and bounds[0] >= 0.0:
         return error_k
     return math.copysign(max(abs(error_k) - doubt_k, 0.0), error_k)

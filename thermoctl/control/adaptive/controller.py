@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 from thermoctl.control.adaptive import trial
 from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.coasting import Outlook, ahead, power_for
-from thermoctl.control.adaptive.filters import GAIN_MAX, GAIN_MIN
+from thermoctl.control.adaptive.constants import Hearing, Lags, Pace, Plants
 from thermoctl.control.adaptive.plant_belief import (
     gain,
     holding_power_sd,
@@ -24,18 +24,17 @@ from thermoctl.control.adaptive.trial import Memory
 from thermoctl.control.lasting import Lasting
 from thermoctl.control.minimum_variance import HOLDING_SD_MAX, RIDE_MAX_S
 from thermoctl.ports import Situation
-from thermoctl.quantities import is_finite_number
+from thermoctl.ranges import check_ranges, ranged
 from thermoctl.signals import Beliefs, PlantBelief
 
-CALMNESS_MIN, CALMNESS_MAX = 0.1, 10.0
-RATIO_MIN, RATIO_MAX = 0.02, 10.0
 RIDE_LAGS = 3.0
 UNKNOWN_S, UNKNOWN_PERIODS = 60.0, 10.0
 """After a longer gap nobody knows what was applied: commands expire."""
 
-DOUBTFUL_LEAST, DOUBTFUL_MOST = 2.0 * GAIN_MIN, 0.9 * GAIN_MAX
-"""With less at full power, in K/s, the gain rests on its bound: 200 l at 33 W, or no heater. With
-more it rests on the other one, and power is too strong an answer to any error."""
+DOUBTFUL_LEAST, DOUBTFUL_MOST = 2.0, 0.9
+"""With less than so many times the least gain it rests on its bound: 200 l at 33 W, or no heater.
+With more than this share of the most it rests on the other one, and power is too strong an answer
+to any error."""
 
 SDS_EVERY = 5
 """Standard deviations change slowly: they are reckoned anew after so many samples."""
@@ -100,6 +99,8 @@ class Adaptive:
     cooling_ratio : float
         For heat-cool: what the cooler takes out at full power over what the heater brings in, from
         .02 to 10. Where it is not known, rather too low than too high.
+    lags, plants, hearing, pace : Lags, Plants, Hearing, Pace
+        The constants of the law. No plant met so far wanted others.
 
     Raises
     ------
@@ -107,28 +108,25 @@ class Adaptive:
         An argument is outside its range.
     """
 
-    calmness: float = 0.35
+    calmness: float = ranged(0.35, 0.1, 10.0)
     period_s: float = 1.0
     action: Literal["heat", "cool", "heat-cool"] = "heat"
-    cooling_ratio: float = 0.2
+    cooling_ratio: float = ranged(0.2, 0.02, 10.0)
+    lags: Lags = field(default_factory=Lags)
+    plants: Plants = field(default_factory=Plants)
+    hearing: Hearing = field(default_factory=Hearing)
+    pace: Pace = field(default_factory=Pace)
     bank: Bank = field(init=False, repr=False, compare=False)
 
     name: ClassVar[str] = "adaptive"
 
     def __post_init__(self) -> None:
-        if not (is_finite_number(self.calmness) and CALMNESS_MIN <= self.calmness <= CALMNESS_MAX):
-            raise ValueError(
-                f"calmness must lie in [{CALMNESS_MIN:g}, {CALMNESS_MAX:g}], got {self.calmness!r}"
-            )
+        check_ranges(self)
         if self.action not in ("heat", "cool", "heat-cool"):
             raise ValueError(f"action must be 'heat', 'cool' or 'heat-cool', got {self.action!r}")
-        low, high = RATIO_MIN, RATIO_MAX
-        if not (is_finite_number(self.cooling_ratio) and low <= self.cooling_ratio <= high):
-            raise ValueError(
-                f"cooling_ratio must lie in [{low:g}, {high:g}], got {self.cooling_ratio!r}"
-            )
         u_min = -self.cooling_ratio if self.action == "heat-cool" else 0.0
-        object.__setattr__(self, "bank", Bank(self.period_s, u_min))
+        bank = Bank(self.period_s, u_min, 1.0, self.lags, self.plants, self.hearing)
+        object.__setattr__(self, "bank", bank)
 
     @property
     def _sign(self) -> float:
@@ -192,7 +190,7 @@ class Adaptive:
             bank, memory = trial.met(self.bank, bank, memory, math.nan, power)
         sign = self._sign
         bank, memory = trial.met(self.bank, bank, memory, sign * situation.measured_c, power)
-        doubt = belief.doubt.after(_doubt(bank.outlook))
+        doubt = belief.doubt.after(_doubt(bank.outlook, self.plants))
         due = bank.block is not None and bank.sample % SDS_EVERY == 0
         sds = self._sds(bank, memory) if due else belief.sds
         surprise_k = math.nan if gathered or periods > 1 else sign * bank.surprise_k
@@ -218,7 +216,9 @@ class Adaptive:
             end_c = self._sign * situation.target_c
             r_c, rate = ahead(r_c, rate, end_c, outlook.lag_s)
             ramp_heat = rate / outlook.gain
-        heat = power_for(outlook, r_c, self.calmness, self.period_s, bounds, before, ramp_heat)
+        heat = power_for(
+            outlook, r_c, self.calmness, self.period_s, bounds, before, ramp_heat, self.pace
+        )
         return belief, self._power(heat)
 
     def surprise_k(self, belief: AdaptiveBelief, situation: Situation) -> float:
@@ -261,14 +261,17 @@ class Adaptive:
         return remarks
 
 
-def _doubt(outlook: Outlook | None) -> str:
+def _doubt(outlook: Outlook | None, plants: Plants) -> str:
     """Return what is doubtful of the gain, "" for nothing.
 
     Told that power cools, the filters rest on their lower bound. On the upper one rests a plant
     that is quicker than any they know.
     """
-    if outlook is None or DOUBTFUL_LEAST < outlook.gain < DOUBTFUL_MOST:
+    if outlook is None:
         return ""
-    weak = outlook.gain <= DOUBTFUL_LEAST
-    expected = f"more than {DOUBTFUL_LEAST:g}" if weak else f"less than {DOUBTFUL_MOST:g}"
+    least = DOUBTFUL_LEAST * plants.gain_min_k_per_s
+    most = DOUBTFUL_MOST * plants.gain_max_k_per_s
+    if least < outlook.gain < most:
+        return ""
+    expected = f"more than {least:g}" if outlook.gain <= least else f"less than {most:g}"
     return f"expected {expected} K/s at full power, learnt {outlook.gain:.2g}"

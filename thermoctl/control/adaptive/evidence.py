@@ -10,8 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thermoctl.control.adaptive.hypotheses import LAGS, Hypotheses
+from thermoctl.control.adaptive.constants import Hearing
+from thermoctl.control.adaptive.hypotheses import SHAPES, Hypotheses
 from thermoctl.quantities import Array, clamp
+
+USUAL = Hearing()
 
 # -- noise ----------------------------------------------------------------------------------------
 
@@ -58,14 +61,6 @@ class Noise(NamedTuple):
 
 # -- excitation -----------------------------------------------------------------------------------
 
-DEAD_ZONE = 0.05
-"""Power this close to its mean proves nothing. In quiet regulation ln S alone would speak, always
-for a small gain, and a small vessel drift to a wrong hypothesis."""
-MEMORY_S, MEMORY_LAGS = 50.0, 2.0
-"""The mean is that of so long a time, and of so many lags where that is longer. What a move of the
-power proves is seen when its heat arrives: had the mean followed by then, nobody would listen. The
-first guess of a slow plant, slower yet, then steers so calmly that it is never put right."""
-
 
 class Excitation(NamedTuple):
     """How much the power moves, and so how much a sample proves.
@@ -73,7 +68,7 @@ class Excitation(NamedTuple):
     Parameters
     ----------
     mean_power : float
-        Running mean of the power over `MEMORY_S`, or longer in a slow plant.
+        Running mean of the power over some time, or longer in a slow plant.
     share : float
         What the last sample counts as evidence, in [0, 1].
     """
@@ -81,35 +76,31 @@ class Excitation(NamedTuple):
     mean_power: float = 0.0
     share: float = 0.0
 
-    def after(self, power: float, period_s: float, memory_s: float = 0.0) -> Excitation:
-        """Return the excitation after a period of `power`; the mean is of `memory_s`."""
-        away = power - self.mean_power
-        share = clamp((abs(away) - DEAD_ZONE) / DEAD_ZONE, 0.0, 1.0)
-        return Excitation(
-            self.mean_power + period_s / max(memory_s, MEMORY_S, period_s) * away, share
-        )
+    def after(
+        self, power: float, period_s: float, memory_s: float = 0.0, hearing: Hearing = USUAL
+    ) -> Excitation:
+        """Return the excitation after a period of `power`; the mean is of `memory_s` at least."""
+        away, dead = power - self.mean_power, hearing.dead_zone
+        share = clamp((abs(away) - dead) / dead, 0.0, 1.0)
+        moved = period_s / max(memory_s, hearing.memory_s, period_s) * away
+        return Excitation(self.mean_power + moved, share)
 
 
-def forgetting(hypotheses: Hypotheses) -> Array:
+def forgetting(hypotheses: Hypotheses, hearing: Hearing) -> Array:
     """Return what each hypothesis would forget of the mean power in a second.
 
     It is these that are averaged and not the times: as long as a short lag is as likely as a long
     one, the mean is that of a short time.
     """
-    return 1.0 / (MEMORY_LAGS * hypotheses.lag_s)
+    return 1.0 / (hearing.memory_lags * hypotheses.lag_s)
 
 
 # -- outliers and jumps ---------------------------------------------------------------------------
 
-GATE = 25.0
-"""Normalised innovations squared beyond this are outside: five standard deviations."""
 GATE_SAMPLES = 20
 """So many valid samples come before the gate closes: they show what is likely."""
 OUTLIERS = 2
 """So many samples outside in a row are nobody's; one more, and the water has jumped."""
-HOLD_LAGS = 5.0
-"""No evidence about lags for so many of them after a jump, or it would be read as a change of lag.
-What it says of shapes is heard: how fast the reading follows is the sensor alone."""
 
 
 class Gate(NamedTuple):
@@ -140,15 +131,10 @@ class Gate(NamedTuple):
 
 # -- drifts ---------------------------------------------------------------------------------------
 
-QUIET_LAGS, QUIET_SAMPLES = 3.0, 20
-"""After so many lags of steady power, and so many samples, nothing is under way any more,"""
-QUIET_POWER = 0.15
-"""if the power is this close to what holds the water: a warm-up is steady too, and no rest."""
+QUIET_SAMPLES = 20
+"""At rest means so many samples at least."""
 DRIFTS = 0.5
 """The sums are made to find innovations that are off by twice this, in standard deviations."""
-SUSPECTED, DRIFTED = 3.0, 14.0
-"""Of white innovations a sum is beyond the first for 6 % of the time, and reaches the second three
-times in ten million samples: about once in 40 days without a move of the power."""
 
 
 class Drifting(NamedTuple):
@@ -169,6 +155,10 @@ class Drifting(NamedTuple):
         The sample before which a disturbance is being learnt, and power proves nothing.
     disturbed : bool
         Whether power has not been steady since the last one.
+    suspected : bool
+        Whether power that moves now may well answer to a drift, and so proves nothing.
+    found : bool
+        Whether the water drifts.
     """
 
     calm: int = 0
@@ -176,8 +166,10 @@ class Drifting(NamedTuple):
     below: float = 0.0
     silent_until: float = -math.inf
     disturbed: bool = False
+    suspected: bool = False
+    found: bool = False
 
-    def after(self, still: bool, nu: float, rest: float) -> Drifting:
+    def after(self, still: bool, nu: float, rest: float, hearing: Hearing = USUAL) -> Drifting:
         """Return the sums after one more innovation.
 
         Parameters
@@ -188,23 +180,17 @@ class Drifting(NamedTuple):
             The innovation over its standard deviation.
         rest : float
             Samples of it after which the water is at rest.
+        hearing : Hearing
+            What makes a sum suspicious, and what proves it.
         """
         calm = self.calm + 1 if still or self.suspected else 0
         disturbed = self.disturbed and calm < rest
         if calm < rest and not disturbed:
             return Drifting(calm, silent_until=self.silent_until)
         above, below = max(self.above + nu - DRIFTS, 0.0), max(self.below - nu - DRIFTS, 0.0)
-        return Drifting(calm, above, below, self.silent_until, disturbed)
-
-    @property
-    def suspected(self) -> bool:
-        """Whether power that moves now may well answer to a drift, and so proves nothing."""
-        return max(self.above, self.below) > SUSPECTED
-
-    @property
-    def found(self) -> bool:
-        """Whether the water drifts."""
-        return max(self.above, self.below) > DRIFTED
+        most = max(above, below)
+        suspected, found = most > hearing.suspected_sds, most > hearing.drifted_sds
+        return Drifting(calm, above, below, self.silent_until, disturbed, suspected, found)
 
 
 # -- weights --------------------------------------------------------------------------------------
@@ -253,7 +239,8 @@ class Weights(NamedTuple):
 
         Of each lag all shapes together keep the weight they had.
         """
-        log, before = _likelihood(nis, S, 1.0).reshape(LAGS, -1), self.share.reshape(LAGS, -1)
+        log = _likelihood(nis, S, 1.0).reshape(-1, len(SHAPES))
+        before = self.share.reshape(-1, len(SHAPES))
         log -= log.max(axis=1, keepdims=True)
         after = before * np.exp(log)
         log += np.log(before.sum(axis=1, keepdims=True) / after.sum(axis=1, keepdims=True))

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from thermoctl.control.adaptive.constants import Plants
 from thermoctl.control.adaptive.hypotheses import Hypotheses
 from thermoctl.quantities import Array
 
@@ -33,31 +34,9 @@ cannot tell the two apart, and a loss that was learnt there in place of a gain i
 START_CORRELATION = 0.98
 """Of T and z: a sensor shows the water it lies in."""
 
-DRIFT_T, DRIFT_D, DRIFT_BETA = 0.08, 0.0008, 2e-4
-"""Noise of T, d and beta in a second, as shares of the gain."""
-UNREST = 5.0
-"""The noise of d grows by this share for every full range between power and holding power: water on
-its way to another temperature, glass and air behind it, loses what it did not lose before."""
-ROOM_K = 40.0
-"""A loss grows as if the surroundings were so much colder: were that left to the noise of d, every
-set point would have a loss to be learnt anew. Most are nearer, where it grows faster than this."""
-LOSS_LAGS, LOSS_SHARE = 2.0, 0.08
-"""After so many lags the heat has arrived, and the gain is known well enough to say how large a
-loss may be: this share of it is the standard deviation that `loosened` adds."""
-REOPENED = 0.05
-"""A loss that has changed has done so by something like this share of the gain."""
-DRIFT_Z_K = 0.003
-"""Noise of z in a second."""
-DRIFT_GAIN_MIN = 1e-4
-"""The shares are of no smaller gain than this, in K/s."""
+GAIN_LEAST = 1e-4
+"""Noises are shares of no smaller gain than this, in K/s."""
 
-KNOWN_SHARE = 0.1
-"""A gain is known once its standard deviation is at most this share of it."""
-
-GAIN_MIN, GAIN_MAX = 2e-5, 1.0
-"""What a heater can do, in K/s: 17 W in 200 l of water, 4 W on 4 g of a board. A plant that is
-quicker is held as if it were no quicker. With 2 K/s and more, long lags and gains that no plant of
-that lag has explain a warm-up as well as the truth does."""
 LOSS_MIN, LOSS_MAX = 0.5, 0.95
 """The loss keeps this far below the least and within this share of full power, in gains."""
 
@@ -83,8 +62,8 @@ UNKNOWN = Prior()
 """A plant never seen before."""
 
 
-class Constants(NamedTuple):
-    """What is the same at every sample, as `constants` makes it; in K and periods.
+class PerPeriod(NamedTuple):
+    """What is the same at every sample, as `per_period` makes it; in K and periods.
 
     Nearly all are arrays of the shape of what they meet. To stretch a number or a row would take
     longer than the operation itself, as few as the hypotheses are.
@@ -97,6 +76,8 @@ class Constants(NamedTuple):
         Variances of T and beta that a period adds, over the square of the gain.
     noise_loss : float
         That of d at rest.
+    unrest, room_k, known_share : float
+        As in `Plants`.
     noise_sensor : ndarray, shape (n,)
         Variance of z that it adds.
     gain_noisy : ndarray, shape (n,)
@@ -112,6 +93,9 @@ class Constants(NamedTuple):
     noise_water: Array
     noise_gain: Array
     noise_loss: float
+    unrest: float
+    room_k: float
+    known_share: float
     noise_sensor: Array
     gain_noisy: Array
     gain_min: Array
@@ -122,23 +106,26 @@ class Constants(NamedTuple):
     power_max: Array
 
 
-def constants(hypotheses: Hypotheses, u_min: float, u_max: float) -> Constants:
+def per_period(hypotheses: Hypotheses, plants: Plants, u_min: float, u_max: float) -> PerPeriod:
     """Return the constants for the period of `hypotheses` and the bounds of power.
 
-    Noise is diag((.08 b)^2, .003^2, (.0008 b)^2, (2e-4 b)^2) times the period h. The gain of a
-    period, and the unit of d and beta, are h times those of a second.
+    Noise is diag((.08 b)^2, .003^2, (.0008 b)^2, (2e-4 b)^2) times the period h, unless `plants`
+    says otherwise. The gain of a period, and the unit of d and beta, are h times those of a second.
     """
     h, one = hypotheses.period_s, np.ones(len(hypotheses))
-    return Constants(
+    return PerPeriod(
         step=np.tile(hypotheses.sensor_step, (5, 1)),
         soon=np.tile(hypotheses.sensor_soon, (5, 1)),
-        noise_water=DRIFT_T**2 / h * one,
-        noise_gain=DRIFT_BETA**2 * h * one,
-        noise_loss=DRIFT_D**2 * h,
-        noise_sensor=DRIFT_Z_K**2 * h * one,
-        gain_noisy=DRIFT_GAIN_MIN * h * one,
-        gain_min=GAIN_MIN * h * one,
-        gain_max=GAIN_MAX * h * one,
+        noise_water=plants.water_drift**2 / h * one,
+        noise_gain=plants.gain_drift**2 * h * one,
+        noise_loss=plants.loss_drift**2 * h,
+        unrest=plants.unrest,
+        room_k=plants.room_k,
+        known_share=plants.known_share,
+        noise_sensor=plants.sensor_drift_k**2 * h * one,
+        gain_noisy=GAIN_LEAST * h * one,
+        gain_min=plants.gain_min_k_per_s * h * one,
+        gain_max=plants.gain_max_k_per_s * h * one,
         loss_min=(u_min - LOSS_MIN) * one,
         loss_max=LOSS_MAX * one,
         power_min=u_min * one,
@@ -164,7 +151,7 @@ def restarted(block: Block, hypotheses: Hypotheses, y_c: float) -> Block:
     return after
 
 
-def predicted(block: Block, heat: Array, constants: Constants, unrest: float = 0.0) -> Block:
+def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0.0) -> Block:
     """Return the block one period later.
 
     T' = T - d + beta q and z' = z + a (T - z) + c (T' - T), exact for water that warms evenly
@@ -179,7 +166,7 @@ def predicted(block: Block, heat: Array, constants: Constants, unrest: float = 0
     warming = block[BETA] * heat
     warming -= block[D]
     water += warming  # F [P | x]
-    grown(after, warming[X])
+    grown(after, warming[X], constants)
     sensor += towards
     warming *= c
     sensor += warming
@@ -202,12 +189,12 @@ def predicted(block: Block, heat: Array, constants: Constants, unrest: float = 0
     b2 *= b2
     TT += constants.noise_water * b2
     ZZ += constants.noise_sensor
-    DD += constants.noise_loss * (1.0 + UNREST * unrest) ** 2 * b2
+    DD += constants.noise_loss * (1.0 + constants.unrest * unrest) ** 2 * b2
     BB += constants.noise_gain * b2
     return after
 
 
-def grown(block: Block, moved_k: Array) -> None:
+def grown(block: Block, moved_k: Array, constants: PerPeriod) -> None:
     """Let the loss go with water that has moved by `moved_k`, in place.
 
     As d' = d + max(d, 0) tanh(moved / 40 K), which keeps its sign and cannot run away, however long
@@ -215,24 +202,24 @@ def grown(block: Block, moved_k: Array) -> None:
     heat from a warmer room: only who heats and cools has it.
     """
     loss = block[D, X]
-    loss += np.maximum(loss, 0.0) * np.tanh(moved_k / ROOM_K)
+    loss += np.maximum(loss, 0.0) * np.tanh(moved_k / constants.room_k)
 
 
-def loosened(block: Block, heat: Array, due: Array) -> None:
-    """Make gain and loss uncertain together, where it is `due`; in place.
+def loosened(block: Block, heat: Array, spread: Array) -> None:
+    """Make gain and loss uncertain together, by the share `spread` of what is heard; in place.
 
     Under constant heat only their difference shows. The start is tight on the loss, so that it does
     not take the place of a gain; now both may grow or shrink by as much, and what was learnt of the
     difference is kept. When the heat falls, the loss is found within seconds.
     """
-    spread = LOSS_SHARE * due * heat * block[BETA, X]
+    spread = spread * heat * block[BETA, X]
     block[D:, D:X] += spread * spread
 
 
-def reopened(block: Block) -> Block:
-    """Return the block with an uncertain loss: the water drifts, so it has changed."""
+def reopened(block: Block, share: float) -> Block:
+    """Return the block with a loss uncertain by `share`: the water drifts, so it has changed."""
     after = block.copy()
-    spread = REOPENED * block[BETA, X]
+    spread = share * block[BETA, X]
     after[D, D] += spread * spread
     return after
 
@@ -250,7 +237,9 @@ def inflated(block: Block, nu: float, R: float) -> Block:
     return after
 
 
-def corrected(block: Block, y_c: float, R: float, proof: float = 1.0) -> tuple[Block, Array, Array]:
+def corrected(
+    block: Block, y_c: float, R: float, constants: PerPeriod, proof: float = 1.0
+) -> tuple[Block, Array, Array]:
     """Return the block after reading `y_c`, the innovations squared over S, and S.
 
     S are the variances of the innovations. Where the gain beta is known, it is corrected by the
@@ -266,7 +255,7 @@ def corrected(block: Block, y_c: float, R: float, proof: float = 1.0) -> tuple[B
     g /= np.sqrt(S)  # P H' / sqrt S, and beside it -nu / sqrt S
     after = g[:X, None] * g
     if proof < 1.0:  # of beta K = p g / sqrt S: Joseph's form differs from P - g g' here alone
-        most = KNOWN_SHARE * block[BETA, X]
+        most = constants.known_share * block[BETA, X]
         most *= most
         known, P, x = block[BETA, BETA] <= most, after[BETA, BETA], after[BETA, X]
         np.multiply(P, proof * (2.0 - proof), out=P, where=known)
@@ -275,7 +264,7 @@ def corrected(block: Block, y_c: float, R: float, proof: float = 1.0) -> tuple[B
     return after, nu * nu, S
 
 
-def project(block: Block, constants: Constants, *, loss: bool) -> None:
+def project(block: Block, constants: PerPeriod, *, loss: bool) -> None:
     """Limit gain, and `loss` too, of a new block to what a plant can have; in place."""
     beta = block[BETA, X]
     np.maximum(beta, constants.gain_min, out=beta)

@@ -11,13 +11,9 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from thermoctl.quantities import Array, is_finite_number
-
-SHORTEST_LAG_S = 3.0
-LONGEST_OVER_SHORTEST = 50.0
-LAGS = 24
-"""3 to 150 s in ratios of 1.185. What full power has under way is known as well as the lag: with
-ratios of 1.30, a plant half-way between two was now taken for the one and now for the other."""
+from thermoctl.control.adaptive.constants import Lags
+from thermoctl.quantities import Array
+from thermoctl.ranges import within
 
 SHAPES = ((0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.05, 0.10, 0.85))
 """Shares of dead time, heater and sensor: all in even parts, a slow heater, and a sensor so slow
@@ -25,6 +21,7 @@ that dead time hardly counts beside it. With dead time of .10 its first readings
 once, would speak for a shorter lag, and the water be far too hot before it is known."""
 
 PERIOD_MIN_S, PERIOD_MAX_S = 0.05, 3600.0
+ANY = Lags()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,21 +64,17 @@ class Hypotheses:
                 value.setflags(write=False)
 
     @classmethod
-    def at_period(cls, period_s: float) -> Self:
-        """Return all of `LAGS` times `SHAPES`, lag by lag.
+    def at_period(cls, period_s: float, lags: Lags = ANY) -> Self:
+        """Return all of `lags` times `SHAPES`, lag by lag.
 
         Raises
         ------
         ValueError
             `period_s` lies outside .05 to 3,600 s.
         """
-        if not (is_finite_number(period_s) and PERIOD_MIN_S <= period_s <= PERIOD_MAX_S):
-            raise ValueError(
-                f"period_s must lie in [{PERIOD_MIN_S:g}, {PERIOD_MAX_S:g}], got {period_s!r}"
-            )
-        lags_s = SHORTEST_LAG_S * LONGEST_OVER_SHORTEST ** (np.arange(LAGS) / (LAGS - 1.0))
-        lag_s = np.repeat(lags_s, len(SHAPES))
-        dead_s, element_s, sensor_s = np.tile(np.array(SHAPES), (LAGS, 1)).T * lag_s
+        within("period_s", period_s, PERIOD_MIN_S, PERIOD_MAX_S)
+        lag_s = np.repeat(lags.each_s, len(SHAPES))
+        dead_s, element_s, sensor_s = np.tile(np.array(SHAPES), (lags.count, 1)).T * lag_s
         dead = np.rint(dead_s / period_s)
         element, sensor = element_s / period_s, sensor_s / period_s
         element_step, sensor_step = -np.expm1(-1.0 / element), -np.expm1(-1.0 / sensor)

@@ -11,7 +11,7 @@ import numpy as np
 
 from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.filters import BETA, D, X
-from thermoctl.control.adaptive.hypotheses import LAGS
+from thermoctl.control.adaptive.hypotheses import SHAPES
 from thermoctl.signals import PlantBelief
 
 LAG_QUANTILES = (0.05, 0.95)
@@ -96,9 +96,9 @@ def lag_quantiles(bank: Bank, belief: BankBelief) -> tuple[float, float]:
     A hypothesis stands for all lags up to half-way to its neighbours, on a scale of ratios: the
     grid cannot tell them apart.
     """
-    weight = belief.weights.share.reshape(LAGS, -1).sum(axis=1)
+    weight = belief.weights.share.reshape(-1, len(SHAPES)).sum(axis=1)
     below = np.concatenate(((0.0,), np.cumsum(weight)))
-    log_lag = np.log(bank.hypotheses.lag_s.reshape(LAGS, -1)[:, 0])
+    log_lag = np.log(bank.hypotheses.lag_s.reshape(-1, len(SHAPES))[:, 0])
     step = log_lag[1] - log_lag[0]
     edges = np.append(log_lag - 0.5 * step, log_lag[-1] + 0.5 * step)
     low, high = np.exp(np.interp(LAG_QUANTILES, below / below[-1], edges)).tolist()

@@ -19,18 +19,12 @@ import numpy as np
 from thermoctl.control.adaptive.bank import Bank, BankBelief
 from thermoctl.control.adaptive.evidence import FLOOR, Noise, weighted
 from thermoctl.control.adaptive.filters import (
-    DRIFT_GAIN_MIN,
-    GAIN_MAX,
+    GAIN_LEAST,
     LOSS_MAX,
     LOSS_MIN,
     Prior,
 )
-from thermoctl.control.adaptive.hypotheses import (
-    LAGS,
-    LONGEST_OVER_SHORTEST,
-    SHAPES,
-    SHORTEST_LAG_S,
-)
+from thermoctl.control.adaptive.hypotheses import SHAPES
 from thermoctl.control.adaptive.plant_belief import plant_belief
 from thermoctl.quantities import Array, is_finite_number
 
@@ -59,12 +53,12 @@ def remember(bank: Bank, belief: BankBelief) -> dict[str, Any] | None:
     if plant is None:
         return None
     rate, rate_sd = plant.gain_k_per_s, plant.gain_sd_k_per_s
-    if not (rate > DRIFT_GAIN_MIN and rate_sd <= KNOWN_SHARE * rate):
+    if not (rate > GAIN_LEAST and rate_sd <= KNOWN_SHARE * rate):
         return None
     return {
         "period_s": bank.period_s,
         "u_min": bank.u_min,
-        "hypotheses": _hypotheses(),
+        "hypotheses": _hypotheses(bank),
         "gain_k_per_s": _rounded(rate),
         "gain_sd_k_per_s": _rounded(rate_sd),
         "loss_k_per_s": _rounded(plant.loss_k_per_s),
@@ -82,14 +76,15 @@ def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBel
     ValueError
         It is of another bank, or no plant could be like that; the text says what was expected.
     """
-    of = {"period_s": bank.period_s, "u_min": bank.u_min, "hypotheses": _hypotheses()}
+    of = {"period_s": bank.period_s, "u_min": bank.u_min, "hypotheses": _hypotheses(bank)}
     for name, expected in of.items():
         if remembered.get(name) != expected:
             raise ValueError(f"expected {name} {expected!r}, got {remembered.get(name)!r}")
-    rate = _number(remembered, "gain_k_per_s", DRIFT_GAIN_MIN, GAIN_MAX)
+    gain_max = bank.plants.gain_max_k_per_s
+    rate = _number(remembered, "gain_k_per_s", GAIN_LEAST, gain_max)
     rate_sd = _number(remembered, "gain_sd_k_per_s", 0.0, KNOWN_SHARE * rate)
     lost = _number(remembered, "loss_k_per_s", (bank.u_min - LOSS_MIN) * rate, LOSS_MAX * rate)
-    lost_sd = _number(remembered, "loss_sd_k_per_s", 0.0, GAIN_MAX)
+    lost_sd = _number(remembered, "loss_sd_k_per_s", 0.0, gain_max)
     variance = _number(remembered, "noise_variance_k2", 0.0, NOISE_MAX_K2)
     log = _log_weights(remembered, len(bank.hypotheses))
     aged = math.sqrt(1.0 + max(age_s, 0.0) / DOUBLED_S)
@@ -103,12 +98,13 @@ def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBel
     return bank.start()._replace(noise=Noise(variance), weights=weights, prior=prior)
 
 
-def _hypotheses() -> dict[str, Any]:
+def _hypotheses(bank: Bank) -> dict[str, Any]:
     """Return which hypotheses there are; weights of others would say nothing of these."""
+    lags = bank.lags
     return {
-        "shortest_lag_s": SHORTEST_LAG_S,
-        "longest_over_shortest": LONGEST_OVER_SHORTEST,
-        "lags": LAGS,
+        "shortest_lag_s": lags.shortest_s,
+        "longest_over_shortest": lags.longest_s / lags.shortest_s,
+        "lags": lags.count,
         "shapes": [list(shape) for shape in SHAPES],
     }
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermoctl.control.adaptive.bank import Ahead, Bank, BankBelief
-from thermoctl.control.adaptive.evidence import EVIDENCE_FROM, GATE
+from thermoctl.control.adaptive.evidence import EVIDENCE_FROM
 from thermoctl.control.adaptive.filters import X, Z
 
 DROP_ODDS = -3.0
@@ -74,7 +74,7 @@ def met(
     if math.isfinite(y_c) and after.sample >= EVIDENCE_FROM:
         heard = after.excitation.share
     if heard > 0.0:
-        odds += heard * (foretold(bank, ahead, y_c) - foretold(rival, rivals, y_c))
+        odds += heard * (foretold(law, bank, ahead, y_c) - foretold(law, rival, rivals, y_c))
     heard_s = memory.heard_s + heard * law.period_s
     return _judged(after, Memory(law.met(rival, rivals, y_c), odds, heard_s))
 
@@ -100,13 +100,14 @@ def _judged(bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:
     return bank, memory
 
 
-def foretold(belief: BankBelief, ahead: Ahead, y_c: float) -> float:
+def foretold(law: Bank, belief: BankBelief, ahead: Ahead, y_c: float) -> float:
     """Return the log likelihood of `y_c` as foreseen; 0 where nothing was."""
     block = ahead.block
     if block is None:
         return 0.0
     nu = y_c - block[Z, X]
     S = block[Z, Z] + belief.noise.believed
-    log = belief.weights.log - 0.5 * (np.log(S) + np.minimum(nu * nu / S, GATE))
+    nis = np.minimum(nu * nu / S, law.hearing.gate_sds**2)
+    log = belief.weights.log - 0.5 * (np.log(S) + nis)
     most = float(log.max())
     return most + math.log(float(np.exp(log - most).sum() * belief.weights.share.max()))

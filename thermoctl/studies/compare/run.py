@@ -26,6 +26,7 @@ BOUND = "bound"
 _TOP = Path(__file__).parents[2]
 _DECISIVE = (
     "quantities.py",
+    "ranges.py",
     "model",
     "estimation",
     "control",
@@ -37,6 +38,7 @@ _DECISIVE = (
 
 _DECISIVE_FOR_BOUNDS = (
     "quantities.py",
+    "ranges.py",
     "plant",
     *(f"studies/compare/{name}.py" for name in ("bounds", "labs", "linear", "riccati", "swift")),
 )

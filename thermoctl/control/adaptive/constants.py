@@ -1,0 +1,226 @@
+"""Every constant of the law that a plant could want otherwise, with its unit and range.
+
+None met so far did: ``docs/sensitivity.md`` tells what each does when it is halved or doubled. What
+is not here is arithmetic, such as the limit on what one sample may say, or is forgotten within
+minutes, such as the first guess of the gain.
+
+Implements section 9 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from thermoctl.quantities import Array
+from thermoctl.ranges import check_ranges, ranged
+
+
+@dataclass(frozen=True, slots=True)
+class Lags:
+    """Which total lags a plant may have, from heater to reading: in equal ratios.
+
+    What full power has under way is known as well as the lag. The ratios are of 1.185; with 1.30, a
+    plant half-way between two was now taken for the one and now for the other.
+
+    Parameters
+    ----------
+    shortest_s : float
+        The shortest one. A quicker plant is taken to be as slow, and held more calmly than need be.
+    longest_s : float
+        The longest one, above the shortest. A slower plant overshoots.
+    count : int
+        How many there are. A wider range wants more of them.
+
+    Raises
+    ------
+    ValueError
+        One of them lies outside its range, or the longest is not above the shortest.
+    """
+
+    shortest_s: float = ranged(3.0, 0.1, 86_400.0)
+    longest_s: float = ranged(150.0, 0.1, 86_400.0)
+    count: int = ranged(24, 2, 96)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+        if not self.longest_s > self.shortest_s:
+            raise ValueError(
+                f"longest_s must be above shortest_s, {self.shortest_s:g}, got {self.longest_s!r}"
+            )
+
+    @property
+    def each_s(self) -> Array:
+        """All of them in s, shape (count,)."""
+        ratio = self.longest_s / self.shortest_s
+        lags_s: Array = self.shortest_s * ratio ** (np.arange(self.count) / (self.count - 1.0))
+        return lags_s
+
+
+@dataclass(frozen=True, slots=True)
+class Plants:
+    """What is taken for granted of any plant: how it drifts, and what a heater can do to it.
+
+    A share is a share of the gain, the rise in a second at full power: so half a litre and 200 are
+    alike.
+
+    Parameters
+    ----------
+    water_drift, loss_drift, gain_drift : float
+        Noise of the water's temperature, the loss and the gain in a second, as shares.
+    sensor_drift_k : float
+        Noise of the sensor's temperature in a second.
+    unrest : float
+        The noise of the loss grows by so much for every full range between power and holding power:
+        water on its way to another temperature, glass and air behind it, loses what it did not lose
+        before.
+    room_k : float
+        A loss grows as if the surroundings were so much colder. Were that left to the noise of the
+        loss, every set point would have one to be learnt anew. Most are nearer, and it grows
+        faster.
+    loosened_lags, loosened_share : float
+        After so many lags the heat has arrived, and the gain is known well enough to say how large
+        a loss may be: gain and loss become uncertain by this share.
+    reopened_share : float
+        A loss that has changed has done so by something like this share.
+    known_share : float
+        A gain is known once its standard deviation is at most this share of it.
+    gain_min_k_per_s, gain_max_k_per_s : float
+        What a heater can do: 17 W in 200 l of water, 4 W on 4 g of a board. A plant that is quicker
+        is held as if it were no quicker. With 2 K/s and more, long lags and gains that no plant of
+        that lag has explain a warm-up as well as the truth does.
+
+    Raises
+    ------
+    ValueError
+        One of them lies outside its range.
+    """
+
+    water_drift: float = ranged(0.08, 1e-8, 10.0)
+    loss_drift: float = ranged(0.0008, 1e-8, 10.0)
+    gain_drift: float = ranged(2e-4, 1e-8, 10.0)
+    sensor_drift_k: float = ranged(0.003, 1e-8, 10.0)
+    unrest: float = ranged(5.0, 0.0, 100.0)
+    room_k: float = ranged(40.0, 1.0, 1e6)
+    loosened_lags: float = ranged(2.0, 0.1, 100.0)
+    loosened_share: float = ranged(0.08, 0.0, 1.0)
+    reopened_share: float = ranged(0.05, 0.0, 1.0)
+    known_share: float = ranged(0.1, 0.0, 1.0)
+    gain_min_k_per_s: float = ranged(2e-5, 1e-8, 0.1)
+    gain_max_k_per_s: float = ranged(1.0, 1e-5, 1e3)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+        least, most = self.gain_min_k_per_s, self.gain_max_k_per_s
+        if not most > least:
+            raise ValueError(f"gain_max_k_per_s must be above the least, {least:g}, got {most!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class Hearing:
+    """What a sample is worth as evidence, and which samples are nobody's.
+
+    Parameters
+    ----------
+    dead_zone : float
+        Power this close to its mean proves nothing. In quiet regulation ln S alone would speak,
+        always for a small gain, and a small vessel drift to a wrong hypothesis.
+    memory_s, memory_lags : float
+        The mean is that of so long a time, and of so many lags where that is longer. What a move of
+        the power proves is seen when its heat arrives: had the mean followed by then, nobody would
+        listen. The first guess of a slow plant, slower yet, then steers so calmly that it is never
+        put right.
+    gate_sds : float
+        An innovation beyond so many standard deviations is outside: nobody's, unless it lasts.
+    hold_lags : float
+        No evidence about lags for so many of them after a jump, or it would be read as a change of
+        lag. What it says of shapes is heard: how fast the reading follows is the sensor alone.
+    quiet_lags, quiet_power : float
+        After so many lags of steady power nothing is under way any more, if the power is this close
+        to what holds the water: a warm-up is steady too, and no rest.
+    suspected_sds, drifted_sds : float
+        Sums of innovations beyond the first: power that moves is no evidence. Beyond the second:
+        the loss has changed. White ones are beyond 3 for 6 % of the time, and reach 14 three times
+        in ten million samples: about once in 40 days without a move of the power.
+
+    Raises
+    ------
+    ValueError
+        One of them lies outside its range.
+    """
+
+    dead_zone: float = ranged(0.05, 1e-4, 1.0)
+    memory_s: float = ranged(50.0, 1.0, 1e5)
+    memory_lags: float = ranged(2.0, 0.1, 100.0)
+    gate_sds: float = ranged(5.0, 2.0, 100.0)
+    hold_lags: float = ranged(5.0, 0.1, 100.0)
+    quiet_lags: float = ranged(3.0, 0.1, 100.0)
+    quiet_power: float = ranged(0.15, 0.0, 1.0)
+    suspected_sds: float = ranged(3.0, 0.1, 1e6)
+    drifted_sds: float = ranged(14.0, 1.0, 1e6)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+        least = self.suspected_sds
+        if not self.drifted_sds > least:
+            raise ValueError(
+                f"drifted_sds must be above suspected_sds, {least:g}, got {self.drifted_sds!r}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How fast an error is answered, and what of the heat under way counts.
+
+    Parameters
+    ----------
+    fastest_s, fastest_periods : float
+        Tc is no shorter, whatever the lag, nor shorter than so many samples: at one sample any
+        error of the gain would be given back whole, and below it the loop would be unstable.
+    heavy_k, calmer : float
+        Where full power puts more than so many kelvin on their way within a lag, each tenth by
+        which the lag is mistaken is that much overshoot: Tc grows by as much, and no more than so
+        many times.
+    smoothness : float
+        The lag of the power itself, as a share of Tc. Noise costs a good deal less travel than at
+        once, while a power that has far to go is at its limit at once all the same.
+    left_out, even : float
+        On the move so much of the heat in the heater is left out of account. Were all of it
+        counted, the error would go by Tc and the water follow as slowly as the heater; so both go
+        at one pace, damped by some .85. A lag that is mistaken then costs more: where the range of
+        power has `even` times `heavy_k` under way all of that heat counts, and beyond it even more.
+    resting, rest_power : float
+        Within so small a surplus of power that heat counts so many times. At rest it is the answer
+        to noise that has passed, and what is taken back of it need not be cooled away.
+    vague_share, vague_k_per_s : float
+        A gain is taken to be larger by what its deviation, no more of it than the second, exceeds
+        this share of it. Else a start in water that is nearly warm would ask for all the power
+        there is.
+    caution, agreed_k : float
+        An error is acted on but for so many standard deviations among the hypotheses beyond the
+        latter. What they disagree in is heat on its way. When it has arrived they agree: nothing
+        waits for ever.
+
+    Raises
+    ------
+    ValueError
+        One of them lies outside its range.
+    """
+
+    fastest_s: float = ranged(3.0, 0.05, 1e4)
+    fastest_periods: float = ranged(1.5, 1.0, 100.0)
+    heavy_k: float = ranged(1.2, 0.01, 1e3)
+    calmer: float = ranged(3.0, 1.0, 100.0)
+    smoothness: float = ranged(0.4, 0.0, 10.0)
+    left_out: float = ranged(0.4, 0.0, 1.0)
+    even: float = ranged(2.0, 0.0, 10.0)
+    resting: float = ranged(2.2, 0.0, 10.0)
+    rest_power: float = ranged(0.08, 0.0, 1.0)
+    vague_share: float = ranged(0.25, 0.0, 10.0)
+    vague_k_per_s: float = ranged(0.05, 0.0, 10.0)
+    caution: float = ranged(1.0, 0.0, 10.0)
+    agreed_k: float = ranged(0.05, 0.0, 10.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
