@@ -1,8 +1,8 @@
 """Fill the tables of docs/configuration.md from the program's own settings.
 
 Run as ``python docs/make_configuration.py``. A line ``<!-- table: NAME -->`` begins a table and
-``<!-- end -->`` ends it; NAME is that of a settings class, ``driver KIND``, ``controller KIND`` or
-``estimator KIND``.
+``<!-- end -->`` ends it; NAME is that of a settings class, ``driver KIND``, ``controller KIND``,
+``estimator KIND``, or ``constants KIND``: what stands in tables within that of a controller.
 """
 
 from __future__ import annotations

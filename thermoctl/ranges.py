@@ -1,4 +1,4 @@
-"""Numbers that a setting may have: written beside its default, checked in one place, listed."""
+"""Numbers that a setting may have, written beside its default."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def ranged(default: float, low: float, high: float) -> Any:
 
 
 def check_ranges(settings: Any) -> None:
-    """Raise ``ValueError`` naming the first field of `settings` that is outside its range."""
+    """Raise ``ValueError`` naming the first field that is outside its range."""
     for each in fields(settings):
         if each.metadata:
             value = getattr(settings, each.name)
@@ -27,6 +27,6 @@ def check_ranges(settings: Any) -> None:
 
 
 def within(name: str, value: Any, minimum: float, maximum: float) -> None:
-    """Raise ``ValueError`` naming `name` unless `value` is a number in [minimum, maximum]."""
+    """Raise ``ValueError`` naming `name` unless `value` is a number within."""
     if not (is_finite_number(value) and minimum <= value <= maximum):
         raise ValueError(f"{name} must lie in [{minimum:g}, {maximum:g}], got {value!r}")

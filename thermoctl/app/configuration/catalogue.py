@@ -65,7 +65,7 @@ def rows_of_model(model: type[BaseModel]) -> list[Row]:
 
 
 def rows_of_law(law: type) -> list[Row]:
-    """Return a row for each option of a controller or an estimator; of a table, for its keys."""
+    """Return a row for each option of a law, and for each key of its tables."""
     return list(_rows("", option_schemas(law)))
 
 

@@ -1,8 +1,7 @@
-"""Every constant of the law that a plant could want otherwise, with its unit and range.
+"""Every constant of the law that a plant could want otherwise, with its range.
 
-None met so far did: ``docs/sensitivity.md`` tells what each does when it is halved or doubled. What
-is not here is arithmetic, such as the limit on what one sample may say, or is forgotten within
-minutes, such as the first guess of the gain.
+None met so far did. What is not here is arithmetic, such as the limit on what one sample may say,
+or is forgotten within minutes, such as the first guess of the gain.
 
 Implements section 9 of ``docs/theory.md``.
 """
@@ -19,7 +18,7 @@ from thermoctl.ranges import check_ranges, ranged
 
 @dataclass(frozen=True, slots=True)
 class Lags:
-    """Which total lags a plant may have, from heater to reading: in equal ratios.
+    """Which total lags a plant may have, from heater to reading; in equal ratios.
 
     What full power has under way is known as well as the lag. The ratios are of 1.185; with 1.30, a
     plant half-way between two was now taken for the one and now for the other.
@@ -60,7 +59,7 @@ class Lags:
 
 @dataclass(frozen=True, slots=True)
 class Plants:
-    """What is taken for granted of any plant: how it drifts, and what a heater can do to it.
+    """What is taken for granted of a plant: how it drifts, what a heater can do.
 
     A share is a share of the gain, the rise in a second at full power: so half a litre and 200 are
     alike.

@@ -79,7 +79,7 @@ class Excitation(NamedTuple):
     def after(
         self, power: float, period_s: float, memory_s: float = 0.0, hearing: Hearing = USUAL
     ) -> Excitation:
-        """Return the excitation after a period of `power`; the mean is of `memory_s` at least."""
+        """Return that after a period of `power`; the mean is of `memory_s` at least."""
         away, dead = power - self.mean_power, hearing.dead_zone
         share = clamp((abs(away) - dead) / dead, 0.0, 1.0)
         moved = period_s / max(memory_s, hearing.memory_s, period_s) * away

@@ -206,7 +206,7 @@ def grown(block: Block, moved_k: Array, constants: PerPeriod) -> None:
 
 
 def loosened(block: Block, heat: Array, spread: Array) -> None:
-    """Make gain and loss uncertain together, by the share `spread` of what is heard; in place.
+    """Make gain and loss uncertain together, by the share `spread`; in place.
 
     Under constant heat only their difference shows. The start is tight on the loss, so that it does
     not take the place of a gain; now both may grow or shrink by as much, and what was learnt of the
@@ -217,7 +217,7 @@ def loosened(block: Block, heat: Array, spread: Array) -> None:
 
 
 def reopened(block: Block, share: float) -> Block:
-    """Return the block with a loss uncertain by `share`: the water drifts, so it has changed."""
+    """Return the block with a loss uncertain by `share`: it has changed."""
     after = block.copy()
     spread = share * block[BETA, X]
     after[D, D] += spread * spread

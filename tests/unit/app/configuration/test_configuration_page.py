@@ -12,7 +12,12 @@ import pytest
 from thermoctl.app import plugins
 from thermoctl.app.compose import wiring_errors
 from thermoctl.app.configuration import tables
-from thermoctl.app.configuration.catalogue import first_line, option_schemas, parameter_texts
+from thermoctl.app.configuration.catalogue import (
+    first_line,
+    option_schemas,
+    parameter_texts,
+    rows_of_law,
+)
 from thermoctl.app.configuration.tables import Table
 from thermoctl.app.configuration.units import unit_of
 from thermoctl.app.settings import load
@@ -45,6 +50,9 @@ def test_every_table_and_kind_that_ships_has_its_place():
         for kind, entry in plugins.kinds(group).items():
             if entry.value.startswith("thermoctl"):
                 expected.add(f"{word} {kind}")
+                law = plugins.find(group, kind)
+                if word == "controller" and any("." in row.key for row in rows_of_law(law)):
+                    expected.add(f"constants {kind}")
     assert marked == expected
 
 
