@@ -64,6 +64,7 @@ class Supervisor:
         self._measurement = Measurement(math.nan)
         self._good_s = 0.0  # good readings without a break
         self._blind_s = 0.0  # time without a good reading that was not paid back yet
+        self._forsaken = False  # SAFE for missing readings alone, no other of which is a new fault
         self._tripping: Verdict | None = None
         self._tripped_lately = False
         self._opened_s: deque[float] = deque(maxlen=limits.OPEN_COUNT)
@@ -106,7 +107,8 @@ class Supervisor:
             self._good_s += seen_s if before is Verdict.GOOD else 0.0
             self._blind_s = max(0.0, self._blind_s - seen_s)
         else:
-            self._good_s = 0.0
+            forgiven = self._forsaken and verdict is Verdict.MISSING
+            self._good_s = max(0.0, self._good_s - interval_s) if forgiven else 0.0
             self._blind_s += interval_s
         if verdict is Verdict.SPIKE:
             ignored = self._judged.outliers
@@ -188,6 +190,7 @@ class Supervisor:
             self._raise("sensor.missing", 16, text, t_s, priority=1 if not rides else 2)
         if self.state in (State.SAFE, State.LATCHED):
             return
+        self._forsaken, self._good_s = missing, 0.0
         self._enter(
             State.RIDE if rides else State.HOLD if holds else State.SAFE,
             f"sensor.{self.verdict.value}",
@@ -201,7 +204,7 @@ class Supervisor:
         The event comes once while the alarm is active, with a `trace` if there is one.
         """
         self._raise(code, fault, text, t_s, trace=trace)
-        self._good_s = 0.0
+        self._forsaken, self._good_s = False, 0.0
         if self.state is not State.LATCHED:
             self._enter(State.SAFE, code)
 

@@ -3,6 +3,7 @@
 import math
 from itertools import cycle, islice
 
+import numpy as np
 import pytest
 
 from thermoctl.regulator.judge import Judged, Verdict, judge
@@ -39,6 +40,33 @@ def test_a_sensor_that_is_mostly_gone_is_safe_within_a_minute_or_two(warm, patte
     assert first <= 300
     assert steps[-1].state is State.SAFE
     assert sum(step.command.power > 0.0 for step in steps) <= 320
+
+
+@pytest.mark.parametrize("share", [0.2, 0.3])
+def test_a_plant_warms_up_though_a_reading_in_four_is_missing_from_the_first_second(
+    drive_with, share
+):
+    rng, cold = np.random.default_rng(3), drive_with(water_c=25.0)
+    for _ in range(1500):
+        cold.step(Quality.MISSING if rng.random() < share else Quality.GOOD)
+    print(f"{share:.0%} missing: {cold.water_c:.2f} degC, SAFE for {safe_s(cold)} s")
+    assert abs(cold.water_c - 37.5) < 0.3
+    assert safe_s(cold) < 600
+
+
+def safe_s(drive):
+    """Return for how many seconds a drive was SAFE."""
+    return sum(step.state is State.SAFE for step in drive.steps)
+
+
+def test_after_a_break_of_the_line_missing_readings_take_back_their_time_and_no_more(warm):
+    warm.run(120, Quality.MISSING)
+    assert warm.steps[-1].state is State.SAFE
+    warm.run(21)  # twenty seconds between good readings
+    warm.run(5, Quality.MISSING)
+    warm.run(15)
+    assert warm.steps[-1].state is State.SAFE
+    assert warm.run(2).state is State.RUN
 
 
 def test_a_hold_at_full_power_is_not_renewed_by_one_reading_in_three(drive_with):
