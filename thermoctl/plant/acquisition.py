@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from thermoctl.plant.noise import Normals, Wander
+from thermoctl.plant.noise import Wander
 from thermoctl.plant.parameters import require
 from thermoctl.quantities import Array
 
@@ -90,9 +90,7 @@ class Acquisition:
     def __init__(self, parameters: AcquisitionParameters, rng: Generator) -> None:
         self._parameters = parameters
         self._rng, frequency_rng = rng.spawn(2)
-        self._frequency = Wander(
-            Normals(frequency_rng), parameters.mains_spread_hz, parameters.mains_s
-        )
+        self._frequency = Wander(frequency_rng, parameters.mains_spread_hz, parameters.mains_s)
         self._phase = TWO_PI * float(frequency_rng.random())
         self._offsets_s = (
             np.arange(parameters.conversions) * parameters.burst_s / parameters.conversions

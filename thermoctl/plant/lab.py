@@ -23,7 +23,7 @@ from typing import NamedTuple
 from numpy.random import Generator
 
 from thermoctl.model.sensor import TMP36
-from thermoctl.plant.noise import Normals, Wander
+from thermoctl.plant.noise import Wander
 from thermoctl.plant.parameters import require
 from thermoctl.plant.tolerances import factor
 from thermoctl.quantities import ZERO_CELSIUS_K, clamp
@@ -186,7 +186,7 @@ class TemperatureLab:
 
     def __init__(self, parameters: LabParameters, rng: Generator) -> None:
         self.parameters = parameters
-        self._room = Wander(Normals(rng), parameters.room_spread_k, parameters.room_s)
+        self._room = Wander(rng, parameters.room_spread_k, parameters.room_s)
         self._heat = start(parameters)
         self._sensor_c = self._heat.first_c
         self._second = 0.0

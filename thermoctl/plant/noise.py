@@ -7,26 +7,17 @@ disturbance at one place does not change the noise at another.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from numpy.random import Generator
 
 BLOCK = 512
 
 
-class Normals:
-    """Standard normal numbers one at a time, drawn in blocks."""
-
-    __slots__ = ("_block", "_rng")
-
-    def __init__(self, rng: Generator) -> None:
-        self._rng = rng
-        self._block: list[float] = []
-
-    def draw(self) -> float:
-        """Return the next number."""
-        if not self._block:
-            self._block = self._rng.standard_normal(BLOCK).tolist()
-        return self._block.pop()
+def normals(rng: Generator) -> Iterator[float]:
+    """Yield standard normal numbers for ever, drawn in blocks."""
+    while True:
+        yield from rng.standard_normal(BLOCK)[::-1].tolist()
 
 
 class Wander:
@@ -34,7 +25,7 @@ class Wander:
 
     Parameters
     ----------
-    normals : Normals
+    rng : Generator
         Where its steps come from; not shared.
     deviation : float
         Stationary standard deviation, at least 0. At 0 nothing is drawn.
@@ -45,13 +36,13 @@ class Wander:
     __slots__ = ("_correlation_s", "_decay", "_deviation", "_interval_s", "_kick", "_normals",
                  "value")  # fmt: skip
 
-    def __init__(self, normals: Normals, deviation: float, correlation_s: float) -> None:
-        self._normals = normals
+    def __init__(self, rng: Generator, deviation: float, correlation_s: float) -> None:
+        self._normals = normals(rng)
         self._deviation = deviation
         self._correlation_s = correlation_s
         self._interval_s = 0.0
         self._decay, self._kick = 1.0, 0.0
-        self.value = deviation * normals.draw() if deviation > 0.0 else 0.0
+        self.value = deviation * next(self._normals) if deviation > 0.0 else 0.0
 
     def advance(self, interval_s: float) -> float:
         """Return the value `interval_s` later."""
@@ -61,5 +52,5 @@ class Wander:
             self._interval_s = interval_s
             self._decay = math.exp(-interval_s / self._correlation_s)
             self._kick = self._deviation * math.sqrt(1.0 - self._decay**2)
-        self.value = self._decay * self.value + self._kick * self._normals.draw()
+        self.value = self._decay * self.value + self._kick * next(self._normals)
         return self.value

@@ -8,7 +8,7 @@ from enum import Enum
 from numpy.random import Generator
 
 from thermoctl.model.actuator import ActuatorLaw, Linear, PhaseAngle, SquareLaw, WholeCycleBurst
-from thermoctl.plant.noise import Normals, Wander
+from thermoctl.plant.noise import Wander
 from thermoctl.plant.parameters import Supply
 
 STAGES: Mapping[str, ActuatorLaw] = {
@@ -59,7 +59,7 @@ class PowerStage:
     def __init__(self, law: ActuatorLaw, rated_w: float, supply: Supply, rng: Generator) -> None:
         self._law = law
         self._rated_w = rated_w
-        self._unrest = Wander(Normals(rng), supply.voltage_spread, supply.voltage_s)
+        self._unrest = Wander(rng, supply.voltage_spread, supply.voltage_s)
         self._t_s = 0.0
         self._sag = 0.0
         self._sag_until_s = 0.0
@@ -89,8 +89,10 @@ class PowerStage:
 
         Negative where the output is inverted.
         """
-        given = self.output.given(self._law.power_from(drive))
-        heater_w = self._rated_w * given * self.mains**2
+        power = self._law.power_from(drive)
+        if self._t_s < self._output_until_s:
+            power = self._output.given(power)
+        heater_w = self._rated_w * power * self.mains**2
         self._t_s += step_s
         self._unrest.advance(step_s)
         return heater_w

@@ -9,7 +9,7 @@ from enum import Enum
 from numpy.random import Generator
 
 from thermoctl.model.sensor import LM335
-from thermoctl.plant.noise import Normals, Wander
+from thermoctl.plant.noise import Wander
 from thermoctl.plant.parameters import Probe
 
 IN_AIR = 8.0
@@ -43,7 +43,7 @@ class ProbeInTank:
 
     def __init__(self, parameters: Probe, initial_c: float, rng: Generator) -> None:
         self._parameters = parameters
-        self._turbulence = Wander(Normals(rng), parameters.turbulence_k, parameters.turbulence_s)
+        self._turbulence = Wander(rng, parameters.turbulence_k, parameters.turbulence_s)
         self._t_s = 0.0
         self._past: deque[tuple[float, float]] = deque([(-math.inf, initial_c), (0.0, initial_c)])
         self._met_c = initial_c

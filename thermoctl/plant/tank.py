@@ -15,7 +15,7 @@ from thermoctl.model.actuator import ActuatorLaw, SquareLaw
 from thermoctl.plant import handling, thermal
 from thermoctl.plant.coil import CoolingCoil
 from thermoctl.plant.ledger import Ledger
-from thermoctl.plant.noise import Normals, Wander
+from thermoctl.plant.noise import Wander
 from thermoctl.plant.parameters import WATER_J_PER_KG_K, TankParameters
 from thermoctl.plant.power_stage import PowerStage
 from thermoctl.plant.probe import ProbeInTank
@@ -45,7 +45,7 @@ class Tank:
         if parameters.second is not None:  # its generator comes last and changes no other
             self.second = ProbeInTank(parameters.second, parameters.initial_c, *rng.spawn(1))
         self.stage = PowerStage(law or SquareLaw(), rated_w, supply, mains_rng)
-        self._loss = Wander(Normals(loss_rng), supply.loss_spread, supply.loss_s)
+        self._loss = Wander(loss_rng, supply.loss_spread, supply.loss_s)
         self._start = self._heat = thermal.start(parameters)
         self._t_s = 0.0
         self._heater_w = self._cooled_w = 0.0

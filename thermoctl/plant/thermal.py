@@ -51,6 +51,10 @@ class Heat(NamedTuple):
 
 _STORED = Heat._fields.index("electric_j")
 _HANDLED = Heat._fields.index("poured_j")  # from here on only people move anything
+_NOTHING = Heat(*(0.0 for _ in Heat._fields))
+
+Flows = tuple[tuple[float, ...], tuple[float, float], tuple[float, float, float, float]]
+"""What passes between entries: W within the glass, kg/s of vapour and ice, and what is outside."""
 
 
 class Temperatures(NamedTuple):
@@ -173,7 +177,7 @@ def evaporation_kg_per_s(k: Conductances, water_c: float, water_kg: float) -> fl
     if water_c > 100.0:
         excess_w = water_kg * WATER_J_PER_KG_K * (water_c - 100.0) / BOILING_S
         vapour += excess_w / vaporisation_j_per_kg(water_c)
-    return min(wet, 1.0) * vapour
+    return vapour if wet >= 1.0 else wet * vapour
 
 
 def rates(
@@ -194,16 +198,30 @@ def rates(
     cooled_w : float
         Heat that a cooler takes out of the stirred water.
     """
-    return Heat(*_rates(k, heat[:_STORED], heater_w, unrest, cooled_w))
+    flows = _flows(k, heat[:_STORED], unrest)
+    return Heat(*_moved(_NOTHING, 1.0, flows, heater_w, cooled_w))
 
 
-def _rates(
-    k: Conductances, stored: Sequence[float], heater_w: float, unrest: float, cooled_w: float
-) -> tuple[float, ...]:
-    """Return the rates in the order of `Heat`, without what people move.
+def step(
+    k: Conductances,
+    heat: Heat,
+    heater_w: float,
+    unrest: float,
+    step_s: float,
+    cooled_w: float = 0.0,
+) -> Heat:
+    """Return the state `step_s` later by the midpoint rule; at most `LONGEST_STEP_S`."""
+    now = _flows(k, heat[:_STORED], unrest)
+    middle = _moved(heat, 0.5 * step_s, now, heater_w, cooled_w)
+    mean = _flows(k, middle[:_STORED], unrest)
+    return Heat(*_moved(heat, step_s, mean, heater_w, cooled_w), *heat[_HANDLED:])
 
-    Bare numbers in and out: a tank takes four of these a second, and with entries looked up by
-    name a step would take half as long again.
+
+def _flows(k: Conductances, stored: Sequence[float], unrest: float) -> Flows:
+    """Return what passes between entries, in W and kg/s, as `_moved` takes it.
+
+    Bare numbers, here as there: a tank takes four of these a second, and with entries that are
+    looked up by name, or one after the other in a loop, a step would take half as long again.
     """
     element_j, water_j, still_j, wall_j, bath_j, water_kg, ice_kg, bath_kg, bath_ice_kg = stored
     zone_j_per_k = water_kg * WATER_J_PER_KG_K
@@ -225,23 +243,9 @@ def _rates(
     # The zones keep their shares: what the one gains or loses flows on to or from the other.
     passed_c = water_c if gained_kg > 0.0 else still_c
     passed_w = k.still_share * gained_kg * WATER_J_PER_KG_K * passed_c
-    wall_w, bath_w, room_w, thawed_kg = _outside(k, wall_c, unrest, bath_j, bath_kg, bath_ice_kg)
-    return (
-        heater_w - heating_w,
-        heating_w - mixing_w - glass_w - surface_w - vapour_w - melting_w - passed_w - cooled_w,
-        mixing_w - still_glass_w + passed_w,
-        glass_w + still_glass_w - wall_w,
-        bath_w,
-        gained_kg,  # water_kg
-        -melted_kg,
-        thawed_kg,  # bath_kg
-        -thawed_kg,
-        heater_w,  # electric_j
-        surface_w + room_w,
-        vapour_w,
-        vapour_kg,
-        cooled_w,
-    )
+    inside = (heating_w, mixing_w, glass_w, still_glass_w, surface_w, vapour_w, melting_w, passed_w)
+    outside = _outside(k, wall_c, unrest, bath_j, bath_kg, bath_ice_kg)
+    return inside, (vapour_kg, melted_kg), outside
 
 
 def _outside(
@@ -263,19 +267,31 @@ def _outside(
     return wall_w, wall_w - room_w - melting_w, room_w, melting_w / FUSION_J_PER_KG
 
 
-def step(
-    k: Conductances,
-    heat: Heat,
-    heater_w: float,
-    unrest: float,
-    step_s: float,
-    cooled_w: float = 0.0,
-) -> Heat:
-    """Return the state `step_s` later by the midpoint rule; at most `LONGEST_STEP_S`."""
-    stored = heat[:_STORED]  # half-way only this counts, not what crossed the boundary
-    now = _rates(k, stored, heater_w, unrest, cooled_w)
-    half_s = 0.5 * step_s
-    middle = [x + half_s * dx for x, dx in zip(stored, now, strict=False)]
-    mean = _rates(k, middle, heater_w, unrest, cooled_w)
-    moved = [x + step_s * dx for x, dx in zip(heat, mean, strict=False)]
-    return Heat(*moved, *heat[_HANDLED:])
+def _moved(
+    heat: Heat, step_s: float, flows: Flows, heater_w: float, cooled_w: float
+) -> tuple[float, ...]:
+    """Return `heat` after `flows` of `step_s`: what leaves one entry enters another."""
+    stored, crossed = heat[:_STORED], heat[_STORED:_HANDLED]
+    element_j, water_j, still_j, wall_j, bath_j, water_kg, ice_kg, bath_kg, bath_ice_kg = stored
+    electric_j, room_j, vapour_j, vapour_kg, cooled_j = crossed
+    inside, (evaporated_kg, melted_kg), (wall_w, bath_w, room_w, thawed_kg) = flows
+    heating_w, mixing_w, glass_w, still_glass_w, surface_w, vapour_w, melting_w, passed_w = inside
+    water_w = (
+        heating_w - mixing_w - glass_w - surface_w - vapour_w - melting_w - passed_w - cooled_w
+    )
+    return (
+        element_j + step_s * (heater_w - heating_w),
+        water_j + step_s * water_w,
+        still_j + step_s * (mixing_w - still_glass_w + passed_w),
+        wall_j + step_s * (glass_w + still_glass_w - wall_w),
+        bath_j + step_s * bath_w,
+        water_kg + step_s * (melted_kg - evaporated_kg),
+        ice_kg - step_s * melted_kg,
+        bath_kg + step_s * thawed_kg,
+        bath_ice_kg - step_s * thawed_kg,
+        electric_j + step_s * heater_w,
+        room_j + step_s * (surface_w + room_w),
+        vapour_j + step_s * vapour_w,
+        vapour_kg + step_s * evaporated_kg,
+        cooled_j + step_s * cooled_w,
+    )

@@ -6,7 +6,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from thermoctl.plant.noise import Normals, Wander
+from thermoctl.plant.noise import Wander
 from thermoctl.plant.parameters import Bath, Element, Room, TankParameters, Vessel
 from thermoctl.plant.tolerances import VARIED, specimen
 
@@ -90,7 +90,7 @@ def test_an_implausible_spread_is_refused(spread):
 
 @pytest.mark.parametrize("step_s", [0.5, 5.0])
 def test_a_wander_keeps_its_spread_and_forgets_at_its_rate_whatever_the_step(step_s):
-    wander = Wander(Normals(np.random.default_rng(6)), deviation=2.0, correlation_s=10.0)
+    wander = Wander(np.random.default_rng(6), deviation=2.0, correlation_s=10.0)
     walk = np.array([wander.advance(step_s) for _ in range(60_000)])
     assert np.std(walk) == pytest.approx(2.0, rel=0.05)
     correlation = np.corrcoef(walk[1:], walk[:-1])[0, 1]

@@ -91,6 +91,17 @@ def test_a_draught_multiplies_evaporation():
     assert windy == pytest.approx(4.0 * still)
 
 
+@pytest.mark.parametrize("parameters", [TankParameters(), IN_AIR], ids=["rig", "in air"])
+def test_a_step_moves_every_entry_by_its_rate_in_the_middle_of_the_step(parameters):
+    k, begin = conductances(parameters), after(parameters, 300.0, 0.5, 900.0)._replace(ice_kg=0.2)
+    now = rates(k, begin, 700.0, unrest=1.1, cooled_w=50.0)
+    middle = thermal.Heat(*(np.array(begin) + 0.2 * np.array(now)))
+    mean = rates(k, middle, 700.0, unrest=1.1, cooled_w=50.0)
+    assert step(k, begin, 700.0, 1.1, 0.4, cooled_w=50.0) == pytest.approx(
+        np.array(begin) + 0.4 * np.array(mean), rel=1e-12
+    )
+
+
 @pytest.mark.parametrize(
     "parameters",
     [
