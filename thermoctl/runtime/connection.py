@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import traceback
 from collections.abc import Callable, Mapping
-from typing import TypeVar
+from typing import TypeVar, TypeVarTuple
 
 from thermoctl.errors import DriverError, LinkError, TransientError, WrongDevice
 from thermoctl.ports import Board, Clock, Identity, Simulated
@@ -19,6 +19,7 @@ _NOT_YET = "not opened yet"
 
 Report = Callable[..., None]
 T = TypeVar("T")
+Given = TypeVarTuple("Given")
 
 
 class Connection:
@@ -82,7 +83,7 @@ class Connection:
     def read(self, deadline_s: float) -> Mapping[str, RawSample]:
         """Return every input of the board; raise a `DriverError` when it did not answer."""
         board = self._connected()
-        return self._exchanged(lambda: board.read(deadline_s))
+        return self._exchanged(board.read, deadline_s)
 
     def write(
         self, outputs: Mapping[str, float], valid_for_s: float, deadline_s: float
@@ -91,7 +92,7 @@ class Connection:
         board = self._connected()
         zero = not any(outputs.values())
         self._driven = self._driven or not zero
-        taken = self._exchanged(lambda: board.write(outputs, valid_for_s, deadline_s))
+        taken = self._exchanged(board.write, outputs, valid_for_s, deadline_s)
         if zero and all(taken.get(name) == 0.0 for name in outputs):
             self._driven = False
         return taken
@@ -110,10 +111,12 @@ class Connection:
 
     # -- coming and going ------------------------------------------------------------------------
 
-    def _exchanged(self, exchange: Callable[[], Mapping[str, T]]) -> Mapping[str, T]:
+    def _exchanged(
+        self, exchange: Callable[[*Given], Mapping[str, T]], *given: *Given
+    ) -> Mapping[str, T]:
         """Return what the board answers; one whose link is gone, or silent for long, is let go."""
         try:
-            answer = exchange()
+            answer = exchange(*given)
         except LinkError as error:
             self._lose(error)
             raise

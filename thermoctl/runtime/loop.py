@@ -13,7 +13,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from functools import partial
+from typing import TypeVarTuple
 
 from thermoctl.errors import DriverError, FaultError, LinkError, Refused
 from thermoctl.ports import Clock
@@ -36,6 +36,7 @@ AWAITED_S = 10.0
 _EVENTS = 256
 
 Publish = Callable[[Cycle], None]
+Told = TypeVarTuple("Told")
 
 
 class Loop:
@@ -173,7 +174,8 @@ class Loop:
         accepted = self._write({wiring.name: step for wiring, step, _ in walked}) | led
         events = self.take_events()
         for wiring, step, tick_us in walked:
-            self._hand_out(wiring, step, events, accepted[wiring.name], tick_us, late_s)
+            taken = accepted[wiring.name]
+            self._harmless(self._hand_out, wiring, step, events, taken, tick_us, late_s)
 
     def _awaits(self) -> bool:
         """Return whether a board is being opened for the first time, and is not late yet.
@@ -237,7 +239,7 @@ class Loop:
 
     def _write(self, steps: Mapping[str, Step]) -> dict[str, float]:
         """Give every board its drives in one exchange; return the accepted power by loop."""
-        taken: dict[tuple[str, Output], float] = {}
+        taken: dict[Output, float] = {}
         for board in self.boards:
             wired = self._outputs[id(board)]
             if not wired or board.board is None:
@@ -249,7 +251,7 @@ class Loop:
                 lasts_s = min(lasts_s, steps[w.name].command.valid_until_s - now_s)
             try:
                 answer = board.write(drives, lasts_s, now_s + EXCHANGE_S)
-                powers = {(w.name, o): o.power(answer.get(o.channel)) for w, o in wired}
+                powers = {o: o.power(answer.get(o.channel)) for _, o in wired}
             except DriverError as error:
                 lost = isinstance(error, LinkError)
                 code, fault = ("board.lost", 13) if lost else ("output.refused", 22)
@@ -258,12 +260,12 @@ class Loop:
                 self._off(board)
                 self._fail(self._users(board), "cycle.failed", error)
             else:
-                taken |= powers
+                taken.update(powers)
         return {w.name: self._accepted(w, taken) for w in self.wirings if w.outputs}
 
-    def _accepted(self, wiring: Wiring, taken: Mapping[tuple[str, Output], float]) -> float:
+    def _accepted(self, wiring: Wiring, taken: Mapping[Output, float]) -> float:
         """Return the power that a loop's outputs took, after telling its regulator."""
-        shares = [taken[key] for o in wiring.outputs if (key := (wiring.name, o)) in taken]
+        shares = [taken[output] for output in wiring.outputs if output in taken]
         if len(shares) < len(wiring.outputs):
             return math.nan
         accepted = signed(shares)
@@ -288,13 +290,9 @@ class Loop:
         late_s: float,
     ) -> None:
         """Publish the finished cycle of one loop."""
-
-        def publish() -> None:
-            told = replace(step, events=(*step.events, *events)) if events else step
-            truth = wiring.sensor_board.truth()
-            self._publish(Cycle(wiring.name, told, accepted, tick_us, late_s, self.missed, truth))
-
-        self._harmless(publish)
+        told = replace(step, events=(*step.events, *events)) if events else step
+        truth = wiring.sensor_board.truth()
+        self._publish(Cycle(wiring.name, told, accepted, tick_us, late_s, self.missed, truth))
 
     # -- when something fails --------------------------------------------------------------------
 
@@ -345,12 +343,12 @@ class Loop:
             self._hand_out(wiring, wiring.regulator.step(unread), events, math.nan, 0.0, 0.0)
 
         for wiring in self.wirings:
-            self._harmless(partial(publish, wiring))
+            self._harmless(publish, wiring)
 
-    def _harmless(self, call: Callable[[], None]) -> None:
+    def _harmless(self, call: Callable[[*Told], None], *told: *Told) -> None:
         """Make a call that must steer nothing; one that fails is told of, and that is all."""
         try:
-            call()
+            call(*told)
         except Exception as error:  # noqa: BLE001 - readers may fail in any way
             self._fail((), "feed.failed", error)
 
