@@ -39,7 +39,7 @@ def as_line(cycle: Cycle, beside: Mapping[str, Any] = MappingProxyType({})) -> s
 def cycle_record(cycle: Cycle) -> dict[str, Any]:
     """Return what is told of a cycle, None for what is not known."""
     step, beliefs, estimate = cycle.step, cycle.step.beliefs, cycle.step.estimate
-    return {
+    record: dict[str, Any] = {
         "t_s": round(step.t_s, 6),
         "loop": cycle.loop,
         "mode": step.mode.value,
@@ -68,8 +68,10 @@ def cycle_record(cycle: Cycle) -> dict[str, Any]:
         "tick_us": round(cycle.tick_us, 1),
         "late_s": round(cycle.late_s, 6),
         "alarms": [alarm.code for alarm in step.alarms],
-        **{name: value for name, value in cycle.truth.items() if name == "true_temperature_c"},
     }
+    if "true_temperature_c" in cycle.truth:  # of a simulation, which alone knows it
+        record["true_temperature_c"] = cycle.truth["true_temperature_c"]
+    return record
 
 
 def _flat(told: Feasible | ShadowScore) -> dict[str, float | None]:
