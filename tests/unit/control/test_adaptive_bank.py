@@ -124,7 +124,8 @@ def test_whatever_finite_readings_come_a_power_follows(samples, period_s):
             )
             x = belief.block[:, X]
             assert (x[BETA] >= bank.plants.gain_min_k_per_s * period_s).all()
-            assert (x[BETA] <= bank.plants.gain_max_k_per_s * period_s).all()
+            most = bank.plants.heat_max_k / bank.hypotheses.lag_s * period_s
+            assert (x[BETA] <= most * (1.0 + 1e-12)).all()
     assert (belief.outlook is None) == (not any(math.isfinite(y) for y, _ in samples))
 
 
@@ -480,14 +481,17 @@ def test_a_known_gain_moves_by_the_share_of_the_proof_and_stays_that_much_less_s
     assert surer == pytest.approx(proof * (2.0 - proof) * surer_whole, rel=1e-6, abs=1e-18)
 
 
-def test_hypotheses_cover_three_seconds_to_two_and_a_half_minutes_in_three_shapes():
+def test_hypotheses_cover_three_seconds_to_two_and_a_half_minutes_in_four_shapes():
     h = Hypotheses.at_period(1.0)
-    assert len(h) == 72
+    assert len(h) == 96
     assert h.lag_s.min() == pytest.approx(3.0)
     assert h.lag_s.max() == pytest.approx(150.0)
     assert np.unique(np.round(h.lag_s, 6)).size == 24
-    assert (h.element[0::3] < h.element[1::3]).all()
-    assert (h.sensor_step[2::3] < h.sensor_step[0::3]).all()  # the slowest sensor is the third
+    assert (h.element[0::4] < h.element[1::4]).all()
+    assert (h.sensor_step[2::4] < h.sensor_step[0::4]).all()  # the slowest sensor is the third
+    pipe = h.element[3::4] * h.period_s, h.lag_s[3::4]
+    assert pipe[0] == pytest.approx(np.minimum(0.31, 20.0 * 0.31 / 0.82 / pipe[1]) * pipe[1])
+    assert h.dead[3::4] == pytest.approx(np.maximum(0.18 * pipe[1], pipe[1] - 20.0), abs=0.5)
     assert D == 2
 
 

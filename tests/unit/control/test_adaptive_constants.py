@@ -103,7 +103,6 @@ def test_a_constant_outside_its_range_is_refused_by_its_name(table, name):
     [
         ("lags", {"shortest_s": 3.0, "longest_s": 3.0}, "longest_s must be above shortest_s"),
         ("lags", {"count": 24.0}, "count must be a whole number, got 24.0"),
-        ("plants", {"gain_max_k_per_s": 1e-5}, "gain_max_k_per_s must be above the least"),
         ("hearing", {"suspected_sds": 14.0}, "drifted_sds must be above suspected_sds, 14"),
     ],
 )

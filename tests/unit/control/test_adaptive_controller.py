@@ -1,6 +1,7 @@
 """The bank behind the port: time, power, words, and what it is not fooled by."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -231,11 +232,12 @@ def test_a_heater_that_cools_or_is_dead_is_remarked_on(gain):
 
 def test_a_plant_quicker_than_any_that_is_believed_in_is_held_and_remarked_on():
     law = Adaptive()
-    quick = Vessel(gain=1.8, loss=0.3, noise_k=0.05)
+    quick = Vessel(gain=5.0, loss=0.8, noise_k=0.05)
     belief, waters = steered(law, quick, 1500, r=120.0)
-    assert law.remarks(belief) == {
-        "controller.gain_doubtful": "expected less than 0.9 K/s at full power, learnt 1"
-    }
+    assert re.fullmatch(
+        r"expected less than [\d.]+ K/s with a lag of \d+ s, learnt [\d.]+",
+        law.remarks(belief)["controller.gain_doubtful"],
+    )
     assert np.abs(waters[900:] - 120.0).max() < 0.1
 
 

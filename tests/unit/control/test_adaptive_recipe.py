@@ -9,7 +9,7 @@ import pytest
 from thermoctl.control.adaptive.bank import Bank
 from thermoctl.control.adaptive.coasting import power_for
 
-SHAPES = [(0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.05, 0.10, 0.85)]
+SHAPES = [(0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.05, 0.10, 0.85), None]
 
 
 @dataclass
@@ -17,7 +17,7 @@ class Filter:
     """One hypothesis, with everything in K, s and per second."""
 
     lag_s: float
-    shape: tuple[float, float, float]
+    shape: tuple[float, float, float] | None
     h: float
     q: float = 0.0
     q_mean: float = 0.0
@@ -26,7 +26,12 @@ class Filter:
     P: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
 
     def __post_init__(self):
-        dead_s, self.t1_s, self.t2_s = (share * self.lag_s for share in self.shape)
+        pipe = self.shape is None  # and what is beyond heater and sensor, 20 s of both, is dead
+        shares = SHAPES[0] if pipe else self.shape
+        dead_s, self.t1_s, self.t2_s = (share * self.lag_s for share in shares)
+        if pipe and self.t1_s + self.t2_s > 20.0:
+            self.t1_s, self.t2_s = 20.0 * 0.31 / 0.82, 20.0 * 0.51 / 0.82
+            dead_s = self.lag_s - 20.0
         self.nd = round(dead_s / self.h)
 
     def begin(self, y):
@@ -73,7 +78,7 @@ class Filter:
         A = np.eye(4) - np.outer(K, [0, 1, 0, 0])
         self.P = A @ self.P @ A.T + R * np.outer(K, K)
         self.P = (self.P + self.P.T) / 2
-        self.x[3] = min(max(self.x[3], 2e-5), 1.0)
+        self.x[3] = min(max(self.x[3], 2e-5), 60.0 / self.lag_s)
         if limit_loss:
             self.x[2] = min(max(self.x[2], (u_min - 0.5) * self.x[3]), 0.95 * self.x[3])
         return nu, S
@@ -171,7 +176,7 @@ class PlainBank:
                 each.ln_w -= 0.5 * e * (math.log(S) + min(nu**2 / S, 9))
             told.append(math.exp(-0.5 * (math.log(S) + min(nu**2 / S, 9))))
         for j, each in enumerate(self.filters if settling and not jumped else []):
-            family = range(j - j % 3, j - j % 3 + 3)  # all shapes of one lag
+            family = range(j - j % 4, j - j % 4 + 4)  # all shapes of one lag
             kept = sum(shares[i] for i in family) / sum(shares[i] * told[i] for i in family)
             each.ln_w += math.log(told[j] * kept)
         best = max(each.ln_w for each in self.filters)

@@ -192,7 +192,7 @@ BAD = {
     "a gain of NaN": {"gain_k_per_s": math.nan},
     "a gain of nothing": {"gain_k_per_s": 0.0},
     "a negative gain": {"gain_k_per_s": -0.04},
-    "a gain no heater has": {"gain_k_per_s": 3.0},
+    "a gain no heater has": {"gain_k_per_s": 25.0},
     "true as a gain": {"gain_k_per_s": True},
     "a text as a gain": {"gain_k_per_s": "0.04"},
     "a gain nobody knows": {"gain_sd_k_per_s": 0.04},

@@ -33,8 +33,8 @@ UNKNOWN_S, UNKNOWN_PERIODS = 60.0, 10.0
 
 DOUBTFUL_LEAST, DOUBTFUL_MOST = 2.0, 0.9
 """With less than so many times the least gain it rests on its bound: 200 l at 33 W, or no heater.
-With more than this share of the most it rests on the other one, and power is too strong an answer
-to any error."""
+With more than this share of the most under way it rests on the other one, and power is too strong
+an answer to any error."""
 
 SDS_EVERY = 5
 """Standard deviations change slowly: they are reckoned anew after so many samples."""
@@ -82,7 +82,7 @@ class AdaptiveBelief(NamedTuple):
 class Adaptive:
     r"""Learn any plant with a bank of Kalman filters; nothing has to be tuned.
 
-    72 hypotheses about lag and its shape each learn water temperature, loss and gain; they are
+    96 hypotheses about lag and its shape each learn water temperature, loss and gain; they are
     weighted by how well they predicted. The power cancels the error of the temperature at which
     the water would come to rest, within :math:`T_c = \max(3\,\mathrm{s}, 1.5\,h, \kappa L)`, or up
     to three times that where full power has much heat under way.
@@ -265,13 +265,15 @@ def _doubt(outlook: Outlook | None, plants: Plants) -> str:
     """Return what is doubtful of the gain, "" for nothing.
 
     Told that power cools, the filters rest on their lower bound. On the upper one rests a plant
-    that is quicker than any they know.
+    that is quicker than any they know; a gain that is not known yet says nothing of that.
     """
     if outlook is None:
         return ""
+    gain, lag_s = outlook.gain, outlook.lag_s
     least = DOUBTFUL_LEAST * plants.gain_min_k_per_s
-    most = DOUBTFUL_MOST * plants.gain_max_k_per_s
-    if least < outlook.gain < most:
+    if gain <= least:
+        return f"expected more than {least:g} K/s at full power, learnt {gain:.2g}"
+    most = DOUBTFUL_MOST * plants.heat_max_k / lag_s
+    if gain < most or outlook.gain_sd > plants.known_share * gain:
         return ""
-    expected = f"more than {least:g}" if outlook.gain <= least else f"less than {most:g}"
-    return f"expected {expected} K/s at full power, learnt {outlook.gain:.2g}"
+    return f"expected less than {most:.2g} K/s with a lag of {lag_s:.0f} s, learnt {gain:.2g}"

@@ -125,7 +125,7 @@ def per_period(hypotheses: Hypotheses, plants: Plants, u_min: float, u_max: floa
         noise_sensor=plants.sensor_drift_k**2 * h * one,
         gain_noisy=GAIN_LEAST * h * one,
         gain_min=plants.gain_min_k_per_s * h * one,
-        gain_max=plants.gain_max_k_per_s * h * one,
+        gain_max=h * np.maximum(plants.heat_max_k / hypotheses.lag_s, plants.gain_min_k_per_s),
         loss_min=(u_min - LOSS_MIN) * one,
         loss_max=LOSS_MAX * one,
         power_min=u_min * one,

@@ -1,4 +1,4 @@
-"""What the plant might be: total lags times three ways of dividing them.
+"""What the plant might be: total lags times four ways of dividing them.
 
 Implements section 9 of ``docs/theory.md``.
 """
@@ -15,10 +15,16 @@ from thermoctl.control.adaptive.constants import Lags
 from thermoctl.quantities import Array
 from thermoctl.ranges import within
 
-SHAPES = ((0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.05, 0.10, 0.85))
+SHAPES = ((0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.05, 0.10, 0.85), (0.18, 0.31, 0.51))
 """Shares of dead time, heater and sensor: all in even parts, a slow heater, and a sensor so slow
 that dead time hardly counts beside it. With dead time of .10 its first readings, which rise at
-once, would speak for a shorter lag, and the water be far too hot before it is known."""
+once, would speak for a shorter lag, and the water be far too hot before it is known. The fourth is
+the first, as long as its lag is short; from there on a pipe is before the sensor."""
+PIPE = 3
+"""Number of the shape of which heater and sensor together are no slower than `Lags.pipe_beyond_s`:
+what its lag has beyond is dead time. Water that comes through a pipe rises late and then all at
+once, which to any other shape is a long lag and a gain far too large. No more dead time than that:
+were it a share of each lag, short ones as well, plants without a pipe would be taken for one."""
 
 PERIOD_MIN_S, PERIOD_MAX_S = 0.05, 3600.0
 ANY = Lags()
@@ -74,7 +80,10 @@ class Hypotheses:
         """
         within("period_s", period_s, PERIOD_MIN_S, PERIOD_MAX_S)
         lag_s = np.repeat(lags.each_s, len(SHAPES))
-        dead_s, element_s, sensor_s = np.tile(np.array(SHAPES), (lags.count, 1)).T * lag_s
+        parts = np.tile(np.array(SHAPES), (lags.count, 1)).T * lag_s
+        slow = parts[1:, PIPE :: len(SHAPES)]
+        slow *= np.minimum(lags.pipe_beyond_s / slow.sum(axis=0), 1.0)
+        dead_s, element_s, sensor_s = lag_s - parts[1] - parts[2], parts[1], parts[2]
         dead = np.rint(dead_s / period_s)
         element, sensor = element_s / period_s, sensor_s / period_s
         element_step, sensor_step = -np.expm1(-1.0 / element), -np.expm1(-1.0 / sensor)

@@ -80,7 +80,7 @@ def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBel
     for name, expected in of.items():
         if remembered.get(name) != expected:
             raise ValueError(f"expected {name} {expected!r}, got {remembered.get(name)!r}")
-    gain_max = bank.plants.gain_max_k_per_s
+    gain_max = bank.plants.heat_max_k / bank.lags.shortest_s
     rate = _number(remembered, "gain_k_per_s", GAIN_LEAST, gain_max)
     rate_sd = _number(remembered, "gain_sd_k_per_s", 0.0, KNOWN_SHARE * rate)
     lost = _number(remembered, "loss_k_per_s", (bank.u_min - LOSS_MIN) * rate, LOSS_MAX * rate)
@@ -106,6 +106,7 @@ def _hypotheses(bank: Bank) -> dict[str, Any]:
         "longest_over_shortest": lags.longest_s / lags.shortest_s,
         "lags": lags.count,
         "shapes": [list(shape) for shape in SHAPES],
+        "pipe_beyond_s": lags.pipe_beyond_s,
     }
 
 
