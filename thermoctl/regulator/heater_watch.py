@@ -19,14 +19,13 @@ from thermoctl.regulator.heat_climb import Climb
 from thermoctl.regulator.heat_doubt import HeatDoubt, Seen
 from thermoctl.regulator.heat_question import BEFORE_LAGS, BEFORE_S, Answer
 from thermoctl.regulator.heat_response import LAGS_S, Block, Gain, HeatResponse
+from thermoctl.regulator.heat_trial import Trial
 from thermoctl.regulator.supervisor import Emit, Supervisor
 
 SURE = 5.0
 """A gain is known from so many standard deviations on,"""
 ARRIVED_LAGS = 0.5
 """and once heat for so many lags has arrived."""
-RISE_K, RISE_SDS = 0.1, 6.0
-"""A rise beyond both is one."""
 OFF = 0.01
 """Power below this is none."""
 OFF_LAGS = 1.5
@@ -37,11 +36,6 @@ HEARD_S, HEARD_LAGS = 20.0, 0.5
 """A good answer is believed from then on, of a heater that is not known, and of one that is;"""
 BAD_S, BAD_LAGS = 60.0, 2.0
 """a bad one from then on."""
-UNKNOWN_LAGS = 3.0
-"""An unknown one gets another chance after so many of the longest lags, with twice the heat."""
-TRIALS_MOST = 8.0
-"""But not when it had so many times the first heat, 15 minutes in all, and is not likely to heat: a
-converter that stands still, or noise, would hide the answer of any plant until the water boils."""
 CHANGED, AT_ONCE = 0.7, 3.0
 """A gain below this share of the one that was known is the new one; so is one as far above it, but
 no more than so many times the old one at once."""
@@ -94,7 +88,7 @@ class HeaterWatch:
     def __init__(
         self, check: HeaterCheck, period_s: float, supervisor: Supervisor, emit: Emit
     ) -> None:
-        self._check = check
+        self._weakest = check.weakest_k_per_s
         self._unknown_s = max(60.0, 10.0 * period_s)
         self._blocks = Blocks(period_s, 1.0 if check.action == "heat" else -1.0)
         self._repeats = Repeats()
@@ -108,8 +102,7 @@ class HeaterWatch:
         self._t_s = self._off_s = 0.0
         self._failed_s = -math.inf
         self._distrusted_k = 0.0  # heat that must be answered before anything is learnt again
-        self._patience_s = check.first_heat_s
-        self._begin_trial()
+        self._trial = Trial(check)
 
     @property
     def asks(self) -> bool:
@@ -156,11 +149,7 @@ class HeaterWatch:
         self._doubt.clear()
         self._rows.clear()
         self._cut = None
-        self._begin_trial()
-
-    def _begin_trial(self) -> None:
-        """Give an unknown heater its heat anew."""
-        self._trial_s, self._trial_from_s, self._lowest_c = 0.0, self._t_s, math.inf
+        self._trial.begin(self._t_s)
 
     # -- a block ---------------------------------------------------------------------------------
 
@@ -174,6 +163,7 @@ class HeaterWatch:
         self._response.observe(block, learn=learns)
         if self._response.retracted and not self._recalled:
             self._known = None
+            self._trial.begin(self._t_s)
             self._go_on()
         if math.isnan(block.reading_c):
             return
@@ -222,17 +212,10 @@ class HeaterWatch:
 
     def _try(self, block: Block, now: Seen) -> None:
         """Let an unknown heater show a rise; ask it when it has had its heat."""
-        self._lowest_c = min(self._lowest_c, now.reading_c)
         counts = block.power**3 if self._known is None else float(block.power > NEARLY_FULL)
-        self._trial_s += counts * block.span_s  # an unknown one at a fifth of the power: 2 hours
-        rise_k = now.reading_c - self._lowest_c
-        if rise_k > max(RISE_K, RISE_SDS * block.sd_k):
-            self._patience_s = self._check.first_heat_s
-            self._begin_trial()
-        elif self._trial_s >= self._patience_s:
-            given_s = now.t_s - self._trial_from_s
-            expected = f"expected a rise by {block.power:.0%} power in {given_s:.0f} s"
-            self._ask(now, self._trial_from_s, f"{expected}, got {rise_k:.2f} K")
+        why = self._trial.fails(counts, block, now)  # an unknown one at a fifth: after 2 hours
+        if why:
+            self._ask(now, self._trial.from_s, why)
 
     def _compare(self, known: Gain, block: Block, before: Seen, now: Seen, t_s: float) -> None:
         """Compare what a known heater should have done with what came."""
@@ -292,14 +275,12 @@ class HeaterWatch:
                 self._trust()
             else:
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
-        elif known is None and asked_s > UNKNOWN_LAGS * lag_s:
-            if self._patience_s >= TRIALS_MOST * self._check.first_heat_s and not (
-                shown.mean > heat_question.LIKELY * shown.sd
-            ):
+        elif known is None and asked_s > self._trial.listens_s(block.sd_k):
+            if self._trial.exhausted and not shown.mean > heat_question.LIKELY * shown.sd:
                 self._failed_s = self._t_s  # asked often enough: nothing is left to be tried
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
                 return
-            self._patience_s *= 2.0
+            self._trial.enlarge(block.sd_k)
             self._go_on()
 
     def _answer(
@@ -309,9 +290,10 @@ class HeaterWatch:
         known, climbed = self._known, heat_climb.SHOWS * self._climb.shown
         if known is not None:
             return heat_question.of_known_rows(self._rows, cut.from_s, cut.at_s, known, sd_k, sure)
-        weakest, whole = max(self._check.weakest_k_per_s, climbed), not climbed
-        of_unknown = heat_question.of_unknown_rows  # what has climbed may have failed since
-        return of_unknown(self._rows, cut.from_s, cut.at_s, weakest, sd_k, whole=whole)
+        weakest, froms_s = max(self._weakest, climbed), [cut.from_s]
+        if not climbed:  # what has climbed may have failed since
+            froms_s += [self._trial.since_s, -math.inf]
+        return heat_question.of_unknown_rows(self._rows, froms_s, cut.at_s, weakest, sd_k)
 
     def _heated(self, known: Gain, now: Seen, sd_k: float, t_s: float) -> bool:
         """Return whether the reading has risen long after the power went, and latch that."""
@@ -344,7 +326,7 @@ class HeaterWatch:
         elif shown.mean > known.mean / CHANGED:
             self._known = known = known._replace(mean=min(shown.mean, AT_ONCE * known.mean))
         self._recalled = False
-        self._patience_s = self._check.first_heat_s
+        self._trial.begin(self._t_s)
         self._distrusted_k = 0.0
         self._trust()
 
@@ -365,7 +347,8 @@ class HeaterWatch:
             self._accept(shown, asked_s)
             return
         if self._known is None and self._t_s - self._failed_s >= LATELY_S:
-            self._failed_s, self._patience_s = self._t_s, self._check.first_heat_s
+            self._failed_s = self._t_s
+            self._trial.insist(self._t_s)
             self._go_on()
             return
         code = "heater.reversed" if answer is Answer.COOLS else "heater.no_response"
@@ -385,7 +368,8 @@ class HeaterWatch:
 
     def _suspect(self, known: Gain | None) -> None:
         """Go on with a heater that has to answer to its next heat, and soon: or it is latched."""
-        self._failed_s, self._patience_s = self._t_s, self._check.first_heat_s
+        self._failed_s = self._t_s
+        self._trial.insist(self._t_s)
         if known is not None:
             self._distrusted_k = 2.0 * known.stored_k
             from_s = self._t_s - max(known.lag_s, BEFORE_S)
@@ -396,4 +380,4 @@ class HeaterWatch:
         self._cut = None
         self._climb.pause()
         self._doubt.clear()
-        self._begin_trial()
+        self._trial.resume(self._t_s)

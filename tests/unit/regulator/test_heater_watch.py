@@ -161,6 +161,14 @@ def test_fifty_watts_in_two_hundred_litres_are_a_heater():
     assert plant.supervisor.state is State.RUN
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("lag_s", [20.0, 90.0])
+def test_the_weakest_heater_is_not_condemned_for_the_noise_of_a_burst(lag_s):
+    for seed in (8, 28, 29):
+        plant = Plant(gain=6e-5, loss=0.0, lag_s=lag_s, seed=seed, noise_k=0.012).run(5400, 1.0)
+        assert set(plant.names()) <= {"heater.questioned", "heater.answered"}, seed
+
+
 def test_a_litre_of_cold_water_is_no_fault():
     plant = known()
     plant.water_c -= 4.0
