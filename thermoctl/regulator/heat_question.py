@@ -150,7 +150,9 @@ def of_known_rows(
 def of_unknown_rows(
     rows: Iterable[Seen], froms_s: Iterable[float], cut_s: float, weakest: float, sd_k: float
 ) -> tuple[Answer, Gain]:
-    """Return what `rows` say of an unknown heater: since the first of `froms_s` that tells.
+    """Return what `rows` say of an unknown heater, from the first time that tells.
+
+    The times `froms_s` are tried in turn.
 
     An answer counts only if the reading turned the same way when the power was cut, at `cut_s`.
     """

@@ -30,7 +30,7 @@ converter that stands still, or noise, would hide the answer of any plant until 
 
 
 class Trial:
-    """How much heat there may be without a rise, and how long an answer to it is waited for.
+    """How much heat there may be without a rise, and how long to wait for an answer.
 
     Parameters
     ----------
@@ -73,8 +73,10 @@ class Trial:
             self.begin(now.t_s)
         elif self._heat_s >= self._patience_s:
             self._total_s += self._heat_s
-            expected = f"expected a rise by {block.power:.0%} power in {now.t_s - self.from_s:.0f} s"
-            return f"{expected}, got {rise_k:.2f} K"
+            span_s = now.t_s - self.from_s
+            return (
+                f"expected a rise by {block.power:.0%} power in {span_s:.0f} s, got {rise_k:.2f} K"
+            )
         return ""
 
     def listens_s(self, sd_k: float) -> float:

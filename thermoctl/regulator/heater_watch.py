@@ -17,38 +17,26 @@ from thermoctl.regulator.heat_blocks import Blocks, Repeats
 from thermoctl.regulator.heat_check import HeaterCheck
 from thermoctl.regulator.heat_climb import Climb
 from thermoctl.regulator.heat_doubt import HeatDoubt, Seen
+from thermoctl.regulator.heat_known import OFF_LAGS, KnownHeater
 from thermoctl.regulator.heat_question import BEFORE_LAGS, BEFORE_S, Answer
-from thermoctl.regulator.heat_response import LAGS_S, Block, Gain, HeatResponse
+from thermoctl.regulator.heat_response import Block, Gain, HeatResponse
 from thermoctl.regulator.heat_trial import Trial
 from thermoctl.regulator.supervisor import Emit, Supervisor
 
-SURE = 5.0
-"""A gain is known from so many standard deviations on,"""
-ARRIVED_LAGS = 0.5
-"""and once heat for so many lags has arrived."""
 OFF = 0.01
 """Power below this is none."""
-OFF_LAGS = 1.5
-"""After so many lags without power nothing is under way any more."""
 RISES = 0.3
 """A reading that rises by so much of what full power does, without any, is heated all the same."""
 HEARD_S, HEARD_LAGS = 20.0, 0.5
 """A good answer is believed from then on, of a heater that is not known, and of one that is;"""
 BAD_S, BAD_LAGS = 60.0, 2.0
 """a bad one from then on."""
-CHANGED, AT_ONCE = 0.7, 3.0
-"""A gain below this share of the one that was known is the new one; so is one as far above it, but
-no more than so many times the old one at once."""
 WILD, RESTS = 1.3, 0.5
 """A reading that falls faster than a heater which cools this much better than it heated: ice in the
 water, or a sensor in the air. What follows the cut is then no answer; it is over at the second.
 That nothing explains the fall is no answer either: the next heat has to be answered, and soon."""
 WILD_S = 60.0
 """Such a fall is a doubt as soon as after a bad answer, once it lasts longer than water mixes."""
-NEARLY_FULL = 0.9
-"""A heater that an earlier run knew has to show a rise only at so much power."""
-RECALLED_S = 600.0
-"""So long what that knew is better than what this run has learnt."""
 LATELY_S = 1800.0
 """A second verdict within this time latches."""
 ROWS = 450
@@ -94,8 +82,7 @@ class HeaterWatch:
         self._repeats = Repeats()
         self._response, self._doubt, self._climb = HeatResponse(), HeatDoubt(), Climb()
         self._supervisor, self._emit = supervisor, emit
-        self._known: Gain | None = None
-        self._recalled = False  # whether that is of an earlier run, and not yet seen in this one
+        self._heater = KnownHeater()
         self._settled_s = 0.0  # from then on, what was on its way at the start has arrived
         self._rows: deque[Seen] = deque(maxlen=ROWS)
         self._cut: _Cut | None = None
@@ -112,12 +99,12 @@ class HeaterWatch:
     @property
     def known(self) -> Gain | None:
         """What is known of the heater, once it is."""
-        return self._known
+        return self._heater.gain
 
     def recall(self, known: Gain) -> None:
         """Begin with what an earlier run knew; in the end this one learns it."""
-        self._known, self._recalled = known, True
-        self._settled_s = OFF_LAGS * self._longer_s(known)
+        self._heater.recall(known)
+        self._settled_s = self._heater.under_way_s
 
     def observe(self, t_s: float, interval_s: float, reading_c: float, applied: float) -> None:
         """Take in the `applied` power of the last interval and the reading at its end.
@@ -155,14 +142,13 @@ class HeaterWatch:
 
     def _meet(self, block: Block, t_s: float) -> None:
         """Make of a block what there is to be made."""
-        known, sd_k = self._known, block.sd_k
+        known, sd_k = self._heater.gain, block.sd_k
         self._t_s += block.span_s
         self._off_s = self._off_s + block.span_s if block.power < OFF else 0.0
         trusted = self._cut is None and self._distrusted_k <= 0.0 and self._climb.calm(sd_k)
         learns = trusted and (known is None or self._doubt.calm(known, sd_k))
         self._response.observe(block, learn=learns)
-        if self._response.retracted and not self._recalled:
-            self._known = None
+        if self._response.retracted and self._heater.retract():
             self._trial.begin(self._t_s)
             self._go_on()
         if math.isnan(block.reading_c):
@@ -174,18 +160,19 @@ class HeaterWatch:
             self._hear(self._cut, block, now, t_s)
             return
         if learns:
-            self._know(now)
+            self._heater.learn(self._response.gain, now)
+            self._heater.follow(block.power, now)
         if before is not None:
             self._follow(block, before, now)
-        if self._cut is None and (self._known is None or self._recalled):
+        if self._cut is None and not self._heater.seen:
             self._try(block, now)
-        settled = self._t_s >= self._settled_s and self._cut is None
-        if self._known is not None and settled and before is not None:
-            self._compare(self._known, block, before, now, t_s)
+        known, settled = self._heater.gain, self._t_s >= self._settled_s
+        if known is not None and settled and self._cut is None and before is not None:
+            self._compare(known, block, before, now, t_s)
 
     def _follow(self, block: Block, before: Seen, now: Seen) -> None:
         """Follow a climb, of a heater that is known or not; ask it when it has stalled."""
-        known, climb, jumped = self._known, self._climb, self._response.jumped
+        known, climb, jumped = self._heater.gain, self._climb, self._response.jumped
         climb.observe(known, block, before, now, jumped=jumped)
         if known is None and not jumped and climb.calm(block.sd_k):
             self._doubt.begin(before, now)
@@ -195,32 +182,16 @@ class HeaterWatch:
                 now, now.t_s - max(BEFORE_LAGS * lag_s, heat_climb.STALLED_S), climb.told(now)
             )
 
-    def _know(self, now: Seen) -> None:
-        """Take what was learnt for known, once it is sure."""
-        gain = self._response.gain
-        if gain is None or gain is self._known or gain.mean <= SURE * gain.sd:
-            return
-        if self._recalled and self._t_s < RECALLED_S:
-            return
-        if now.heat_s[gain.place] > ARRIVED_LAGS * gain.lag_s:
-            self._known, self._recalled = gain, False
-
-    def _longer_s(self, known: Gain) -> float:
-        """Return the lag of a heater, or a longer one where it may be another than it was."""
-        longer = min(known.place + self._recalled, len(LAGS_S) - 1)
-        return LAGS_S[longer]
-
     def _try(self, block: Block, now: Seen) -> None:
         """Let an unknown heater show a rise; ask it when it has had its heat."""
-        counts = block.power**3 if self._known is None else float(block.power > NEARLY_FULL)
-        why = self._trial.fails(counts, block, now)  # an unknown one at a fifth: after 2 hours
+        why = self._trial.fails(self._heater.counts(block.power), block, now)
         if why:
             self._ask(now, self._trial.from_s, why)
 
     def _compare(self, known: Gain, block: Block, before: Seen, now: Seen, t_s: float) -> None:
         """Compare what a known heater should have done with what came."""
-        if self._recalled and self._heated(known, now, block.sd_k, t_s):
-            return  # of any other it would have to be sure of the lag, too
+        if not self._heater.proven and self._heated(known, now, block.sd_k, t_s):
+            return  # one that is proven is judged by what may come late, below
         doubt, sd_k, jumped = self._doubt, block.sd_k, self._response.jumped
         again = self._distrusted_k > 0.0
         follow = not again and self._climb.calm(sd_k)
@@ -228,8 +199,8 @@ class HeaterWatch:
         if again and doubt.calm(known, sd_k):
             heat_s = now.heat_s[known.place] - before.heat_s[known.place]
             self._distrusted_k -= known.mean * heat_s
-        hot = doubt.hot(known, sd_k) and not self._recalled  # less water is no fault
-        if hot and self._off_s >= OFF_LAGS * self._longer_s(known):
+        hot = doubt.hot(known, sd_k) and self._heater.seen  # less water is no fault
+        if hot and self._off_s >= self._heater.under_way_s:
             rate = self._rising(known, now, sd_k)
             if rate > 0.0:  # nothing is proven while too few readings show a slope
                 self._fail("heater.stuck_on", heat_question.told_of(rate), t_s)
@@ -250,8 +221,7 @@ class HeaterWatch:
 
     def _hear(self, cut: _Cut, block: Block, now: Seen, t_s: float) -> None:
         """Look for an answer; go on when it is a good one, fail when it is none."""
-        known, asked_s = self._known, now.t_s - cut.at_s
-        lag_s = LAGS_S[-1] if known is None else self._longer_s(known)
+        known, lag_s, asked_s = self._heater.gain, self._heater.longer_s, now.t_s - cut.at_s
         if known is not None and self._heated(known, now, block.sd_k, t_s):
             return
         answer, shown = self._answer(cut, block.sd_k)
@@ -287,7 +257,7 @@ class HeaterWatch:
         self, cut: _Cut, sd_k: float, sure: float = heat_question.SURE
     ) -> tuple[Answer, Gain]:
         """Return what the reading says so far, and the gain it shows."""
-        known, climbed = self._known, heat_climb.SHOWS * self._climb.shown
+        known, climbed = self._heater.gain, heat_climb.SHOWS * self._climb.shown
         if known is not None:
             return heat_question.of_known_rows(self._rows, cut.from_s, cut.at_s, known, sd_k, sure)
         weakest, froms_s = max(self._weakest, climbed), [cut.from_s]
@@ -297,7 +267,7 @@ class HeaterWatch:
 
     def _heated(self, known: Gain, now: Seen, sd_k: float, t_s: float) -> bool:
         """Return whether the reading has risen long after the power went, and latch that."""
-        if self._off_s <= (OFF_LAGS + 1.0) * self._longer_s(known):
+        if self._off_s <= self._heater.under_way_s + self._heater.longer_s:
             return False
         rate = self._rising(known, now, sd_k)
         heated = rate > RISES * known.mean
@@ -319,13 +289,7 @@ class HeaterWatch:
         """Go on with a heater that heats, and with the gain it has shown if that is news."""
         text = f"{asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s"
         self._emit("heater.answered", text=text)
-        known = self._known
-        if known is None or shown.mean < CHANGED * known.mean:
-            cools_per_s = 0.0 if known is None else known.cools_per_s
-            self._known = known = shown._replace(cools_per_s=cools_per_s)
-        elif shown.mean > known.mean / CHANGED:
-            self._known = known = known._replace(mean=min(shown.mean, AT_ONCE * known.mean))
-        self._recalled = False
+        self._heater.accept(shown)
         self._trial.begin(self._t_s)
         self._distrusted_k = 0.0
         self._trust()
@@ -343,16 +307,16 @@ class HeaterWatch:
         never seen comes to rest, anything may move its reading for a minute. One that an earlier
         run knew may be a weaker one by now, where a little is an answer.
         """
-        if self._recalled and shown.mean > heat_question.SURE * shown.sd:
+        if self._heater.recalled and shown.mean > heat_question.SURE * shown.sd:
             self._accept(shown, asked_s)
             return
-        if self._known is None and self._t_s - self._failed_s >= LATELY_S:
+        if self._heater.gain is None and self._t_s - self._failed_s >= LATELY_S:
             self._failed_s = self._t_s
             self._trial.insist(self._t_s)
             self._go_on()
             return
         code = "heater.reversed" if answer is Answer.COOLS else "heater.no_response"
-        known = "" if self._known is None else f" instead of {self._known.mean:.3g}"
+        known = "" if self.known is None else f" instead of {self.known.mean:.3g}"
         show = f"{asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s{known}"
         self._fail(code, f"{cut.why}; {show}", t_s)
 
@@ -362,9 +326,9 @@ class HeaterWatch:
         self._supervisor.fail(code, fault, text, t_s)
         if code == "heater.stuck_on" or self._t_s - self._failed_s < LATELY_S:
             self._supervisor.latch(code, fault, text, t_s)
-            if self._recalled:  # once it is mended, or acknowledged, it is a new one
-                self._known, self._recalled = None, False
-        self._suspect(self._known)
+            if self._heater.recalled:  # once it is mended, or acknowledged, it is a new one
+                self._heater.forget()
+        self._suspect(self._heater.gain)
 
     def _suspect(self, known: Gain | None) -> None:
         """Go on with a heater that has to answer to its next heat, and soon: or it is latched."""

@@ -184,3 +184,34 @@ def test_after_a_bad_answer_the_loss_is_what_was_seen_without_power(fell, loss):
     assert doubt.loss(gain) == pytest.approx(0.02)
     doubt.distrust(gain, fell)
     assert doubt.loss(gain) == pytest.approx(loss)
+
+
+@pytest.mark.parametrize(("gain", "lag_s", "began_s"), [(0.045, 30.0, 120), (0.11, 15.0, 60)])
+@pytest.mark.parametrize("behind_s", [50.0, 80.0])
+def test_a_stirrer_that_stands_in_the_first_warm_up_is_no_heater_that_is_stuck_on(
+    gain, lag_s, began_s, behind_s
+):
+    plant = Plant(gain=gain, loss=0.1 * gain, lag_s=lag_s).run(began_s, 1.0)
+    shown = deque([plant.water_c], maxlen=1)
+
+    def behind(water_c):
+        shown.append(shown[0] + (water_c - shown[0]) / tau_s)
+        return shown[0]
+
+    plant.shows, tau_s, stops_c = behind, behind_s, plant.water_c + 150.0 * gain
+    plant.run(300, lambda _: 1.0 if shown[0] < stops_c else 0.0)
+    tau_s = 4.0
+    plant.run(900, lambda _: 1.0 if shown[0] < stops_c else 0.0)
+    assert plant.supervisor.state is State.RUN
+    assert "heater.stuck_on" not in plant.names()
+
+
+@pytest.mark.parametrize(("gain", "lag_s"), [(0.045, 30.0), (0.02, 60.0)])
+def test_a_heater_that_sticks_before_its_power_was_ever_reduced_is_told_within_seven_minutes(
+    gain, lag_s
+):
+    plant = Plant(gain=gain, loss=0.1 * gain, lag_s=lag_s).run(200, 1.0)
+    plant.does = lambda _: 1.0
+    plant.run(420, 0.0)
+    assert plant.supervisor.state is State.LATCHED
+    assert plant.names()[-1] == "heater.stuck_on"

@@ -89,7 +89,7 @@ def test_the_lag_that_seemed_to_be_none_is_learnt_from_the_first_move_of_the_pow
 def test_a_slope_that_nobody_can_tell_proves_nothing():
     vessel = Vessel().warm_up(900)
     known = vessel.watch.known
-    vessel.watch._known = known._replace(place=0, mean=0.2 * known.mean)
+    vessel.watch._heater.gain = known._replace(place=0, mean=0.2 * known.mean)
     vessel.watch._rows.clear()
     vessel.watch._doubt._extra_k = math.inf
     vessel.applied = 0.0

@@ -1,0 +1,125 @@
+"""What is known of a heater, who has seen it, and whether its lag was seen.
+
+A heater may be unknown, known of an earlier run, or seen to heat in this one. What an earlier run
+knew may be of another plant: where that makes a difference, its lag is taken for the next longer
+one, and what this run learns takes its place after ten minutes.
+
+A first warm-up at full power shows a gain, but hardly how long heat is on its way: as long as the
+power stays, a plant whose stirrer has stopped goes on as before, only later. It shows once there is
+less power and the reading obeys. Until then heat may be under way for as long as in any plant.
+"""
+
+from __future__ import annotations
+
+from thermoctl.regulator.heat_doubt import Seen
+from thermoctl.regulator.heat_response import LAGS_S, Gain
+
+SURE = 5.0
+"""A gain is known from so many standard deviations on,"""
+ARRIVED_LAGS = 0.5
+"""and once heat for so many lags has arrived."""
+RECALLED_S = 600.0
+"""So long what an earlier run knew is better than what this one has learnt."""
+NEARLY_FULL = 0.9
+"""It has to show a rise only at so much power."""
+CHANGED, AT_ONCE = 0.7, 3.0
+"""A gain below this share of the one that was known is the new one; so is one as far above it, but
+no more than so many times the old one at once."""
+OFF_LAGS = 1.5
+"""After so many lags without power nothing is under way any more."""
+EASED, OBEYS_LAGS, RISES = 0.7, 5.0, 0.2
+"""A lag has been seen when less than this share of the power was given for so many, and the reading
+rose beyond what has arrived by less than this share of what full power does."""
+
+
+class KnownHeater:
+    """The gain and the lag of a heater, and how far they can be trusted.
+
+    Attributes
+    ----------
+    gain : Gain or None
+        What is known.
+    recalled : bool
+        Whether it is of an earlier run, and not yet seen in this one.
+    """
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin with a heater that nobody knows."""
+        self.gain: Gain | None = None
+        self.recalled = self._obeys = False
+        self._most = 0.0
+        self._eased: Seen | None = None  # when less power began
+
+    def recall(self, gain: Gain) -> None:
+        """Begin with what an earlier run knew, by powers that moved."""
+        self.gain, self.recalled, self._obeys = gain, True, True
+
+    @property
+    def seen(self) -> bool:
+        """Whether this run has seen it heat."""
+        return self.gain is not None and not self.recalled
+
+    @property
+    def proven(self) -> bool:
+        """Whether this run has seen it heat, and obey less power."""
+        return self.seen and self._obeys
+
+    def retract(self) -> bool:
+        """Forget what this run has learnt; return whether there is nothing left."""
+        if not self.recalled:
+            self.forget()
+        return not self.recalled
+
+    def learn(self, gain: Gain | None, now: Seen) -> None:
+        """Take `gain` for known, once it is sure."""
+        if gain is None or gain is self.gain or gain.mean <= SURE * gain.sd:
+            return
+        if self.recalled and now.t_s < RECALLED_S:
+            return
+        if now.heat_s[gain.place] > ARRIVED_LAGS * gain.lag_s:
+            self.gain, self.recalled = gain, False
+
+    def accept(self, shown: Gain) -> None:
+        """Take for known what an answer has `shown`, if that is news."""
+        known = self.gain
+        if known is None or shown.mean < CHANGED * known.mean:
+            cools_per_s = 0.0 if known is None else known.cools_per_s
+            known = shown._replace(cools_per_s=cools_per_s)
+        elif shown.mean > known.mean / CHANGED:
+            known = known._replace(mean=min(shown.mean, AT_ONCE * known.mean))
+        self.gain, self.recalled = known, False
+
+    def follow(self, power: float, now: Seen) -> None:
+        """See whether the reading obeys less `power`, in a block without a doubt."""
+        self._most = max(self._most, power)
+        gain, start = self.gain, self._eased
+        if gain is None or self._obeys or power >= EASED * self._most:
+            self._eased = None
+        elif start is None:
+            self._eased = now
+        elif now.t_s - start.t_s >= OBEYS_LAGS * gain.lag_s:
+            heat_s = now.heat_s[gain.place] - start.heat_s[gain.place]
+            most_k = gain.mean * (heat_s + RISES * (now.t_s - start.t_s))
+            self._obeys, self._eased = now.reading_c - start.reading_c < most_k, None
+
+    def counts(self, power: float) -> float:
+        """Return what `power` counts for while a heater has still to be seen.
+
+        The cube of it where nothing is known: at a fifth of the power there are two hours.
+        """
+        return power**3 if self.gain is None else float(power > NEARLY_FULL)
+
+    @property
+    def longer_s(self) -> float:
+        """The lag; the next longer one where it may have changed, the longest, unknown."""
+        if self.gain is None:
+            return LAGS_S[-1]
+        return LAGS_S[min(self.gain.place + self.recalled, len(LAGS_S) - 1)]
+
+    @property
+    def under_way_s(self) -> float:
+        """How long after the power heat of before may still arrive."""
+        return OFF_LAGS * (self.longer_s if self._obeys else LAGS_S[-1])
