@@ -61,11 +61,11 @@ class Vessel:
     def __init__(self, seed):
         self.rng = np.random.default_rng(seed)
         self.water_c = self.sensor_c = 30.0
-        self.heat, self.loss_per_s = 0.0, 4e-4
+        self.heat, self.gain, self.loss_per_s = 0.0, 0.036, 4e-4
 
     def after(self, power):
         self.heat += (1 - math.exp(-1 / 14)) * (power - self.heat)
-        self.water_c += 0.036 * self.heat - self.loss_per_s * (self.water_c - 15.0)
+        self.water_c += self.gain * self.heat - self.loss_per_s * (self.water_c - 15.0)
         self.water_c += 0.001 * self.rng.standard_normal()
         self.sensor_c += (1 - math.exp(-1 / 6)) * (self.water_c - self.sensor_c)
         return self.sensor_c + 0.01 * self.rng.standard_normal()
@@ -91,3 +91,20 @@ def test_the_water_is_back_within_two_minutes_of_a_loss_twice_or_half_as_large(s
         assert off_k[changed : changed + 1000].max() < 0.3
         assert off_k[changed + 120 : changed + 1000].max() < 0.1
     assert max(lags[1000:]) < 1.5 * lags[999]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_a_step_after_half_of_the_water_is_gone_does_not_count_on_the_other_half(seed):
+    bank, vessel = Bank(), Vessel(seed)
+    belief, power, waters = bank.start(), 0.0, []
+    for second in range(3600):
+        if second == 1200:  # half as much is warmed, and the walls that are wet are .6 of those
+            vessel.gain, vessel.loss_per_s = 2.0 * vessel.gain, 1.2 * vessel.loss_per_s
+        belief = bank.observe(belief, vessel.after(power), power)
+        r = 37.5 if second < 2400 else 40.0
+        power = power_for(belief.outlook, r, 0.35, 1.0, bank.bounds, power)
+        waters.append(vessel.water_c)
+    assert max(waters[2400:]) < 40.1
+    assert np.abs(np.array(waters[2800:]) - 40.0).max() < 0.1
+    assert belief.outlook.gain == pytest.approx(vessel.gain, rel=0.15)

@@ -158,6 +158,7 @@ class PlainBank:
         if found and not jumped:
             for each in self.filters:
                 each.P[2, 2] += (0.05 * each.x[3]) ** 2
+                each.P[2:, 2:] += np.outer(0.3 * each.x[2:], 0.3 * each.x[2:])
         if jumped:
             self.silent_until_s = self.k * self.h + 5 * likeliest.lag_s
         if jumped or found:

@@ -292,7 +292,7 @@ class Bank:
             block = filters.inflated(block, nu, R)
             drifting = Drifting(silent_until=gate.silent_until, disturbed=True)
         elif drifting.found:
-            block = filters.reopened(block, self.plants.reopened_share)
+            block = filters.reopened(block, self.plants)
             drifting = Drifting(silent_until=sample + hold, disturbed=True)
         water_c = block[T, X]
         block, nis, S = filters.corrected(block, y_c, R, self.constants, share)

@@ -88,6 +88,8 @@ class Plants:
         a loss may be: gain and loss become uncertain by this share.
     reopened_share : float
         A loss that has changed has done so by something like this share.
+    rescaled_share : float
+        Or loss and gain have both changed, by a factor with this deviation: there is less water.
     known_share : float
         A gain is known once its standard deviation is at most this share of it.
     gain_min_k_per_s : float
@@ -113,6 +115,7 @@ class Plants:
     loosened_lags: float = ranged(2.0, 0.1, 100.0)
     loosened_share: float = ranged(0.08, 0.0, 1.0)
     reopened_share: float = ranged(0.05, 0.0, 1.0)
+    rescaled_share: float = ranged(0.3, 0.0, 1.0)
     known_share: float = ranged(0.1, 0.0, 1.0)
     gain_min_k_per_s: float = ranged(2e-5, 1e-8, 0.1)
     heat_max_k: float = ranged(60.0, 0.01, 1e5)

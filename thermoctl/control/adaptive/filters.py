@@ -216,11 +216,18 @@ def loosened(block: Block, heat: Array, spread: Array) -> None:
     block[D:, D:X] += spread * spread
 
 
-def reopened(block: Block, share: float) -> Block:
-    """Return the block with a loss uncertain by `share`: it has changed."""
+def reopened(block: Block, plants: Plants) -> Block:
+    """Return the block with an uncertain loss: the water drifts, so it has changed.
+
+    By something like a share of the gain, if the surroundings did it. If there is less water than
+    there was, loss and gain have both grown by one factor. The power that holds the water is the
+    same then, so nothing shows of the gain before the next move.
+    """
     after = block.copy()
-    spread = share * block[BETA, X]
+    spread = plants.reopened_share * block[BETA, X]
     after[D, D] += spread * spread
+    both = plants.rescaled_share * block[D:, X]
+    after[D:, D:X] += both[:, None] * both
     return after
 
 
