@@ -25,16 +25,17 @@ def situation(y, applied, r=37.5, interval_s=1.0):
 class Vessel:
     """First-order heater and sensor on water that loses heat, a second a step."""
 
-    def __init__(self, gain=0.036, loss=0.009, water_c=25.0, noise_k=0.005, seed=1):
+    def __init__(self, gain=0.036, loss=0.009, water_c=25.0, noise_k=0.005, seed=1, lags_s=(14, 6)):
         self.gain, self.loss, self.water_c, self.noise_k = gain, loss, water_c, noise_k
+        self.follows = [1.0 - math.exp(-1.0 / lag_s) for lag_s in lags_s]
         self.sensor_c, self.heat = water_c, 0.0
         self.rng = np.random.default_rng(seed)
 
     def reading(self, power):
         """Return what is read a second later."""
-        self.heat += (1.0 - math.exp(-1.0 / 14.0)) * (power - self.heat)
+        self.heat += self.follows[0] * (power - self.heat)
         self.water_c += self.gain * self.heat - self.loss
-        self.sensor_c += (1.0 - math.exp(-1.0 / 6.0)) * (self.water_c - self.sensor_c)
+        self.sensor_c += self.follows[1] * (self.water_c - self.sensor_c)
         return self.sensor_c + self.noise_k * self.rng.standard_normal()
 
 
@@ -85,6 +86,22 @@ def test_a_vessel_it_has_never_seen_comes_to_rest_at_the_set_point():
     assert told.holding_power == pytest.approx(0.25, abs=0.03)
     assert told.lag_s == pytest.approx(20.0, rel=0.5)
     assert law.remarks(belief) == {}
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_two_lags_of_forty_seconds_are_learnt_within_one_warm_up(seed):
+    belief, _, waters = run(SelfTuningGpc(), Vessel(seed=seed, lags_s=(40, 40)), 1100)
+    assert waters.max() < 37.65
+    assert np.abs(waters[750:] - 37.5).max() < 0.1
+    a1, a2 = belief.learnt.theta[:2]
+    assert a1 * a1 >= 4.0 * a2 - 1e-9
+    assert a2 >= -1e-9
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_sensor_slow_beside_the_horizon_is_not_hurried_by_water_that_is_too_hot(seed):
+    _, _, waters = run(SelfTuningGpc(), Vessel(seed=seed, lags_s=(20, 60)), 700)
+    assert waters.max() < 37.7
 
 
 @pytest.mark.parametrize("factor", [0.05, 20.0])

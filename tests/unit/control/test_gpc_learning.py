@@ -99,6 +99,25 @@ def test_poles_stay_inside_however_wild_the_readings_are():
         assert -0.1 <= MODEL.holding(belief.theta) <= 0.95 + 1e-12
 
 
+@pytest.mark.parametrize("n", [2, 3])
+def test_poles_are_those_of_lags_however_wild_the_readings_are(n):
+    model = ChangeModel(n, 3, 1)
+    rng, learner = np.random.default_rng(9), Learner(model, gain_k=0.3, size=1, block_s=10.0)
+    belief = learner.start()
+    for _ in range(500):
+        phi = model.regressor(rng.normal(0.0, 3.0, 3), rng.uniform(0.0, 1.0, 3))
+        belief = learner.update(belief, float(rng.normal(0.0, 3.0)), phi, float(rng.uniform()))
+        roots = np.roots(np.concatenate(((1.0,), belief.theta[: n - 1])))
+        assert np.abs(roots.imag).max() < 1e-6  # a double pole is that far from a pair
+        assert roots.real.min() >= -1e-9
+
+
+def test_a_second_lag_is_not_taken_for_a_pole_that_swings():
+    twice = np.array([-1.56, 0.608, 0.001, 0.01, 0.007, 0.0])  # 40 s each
+    belief = learnt(plant(np.ones(40), twice, noise_k=0.002))
+    assert MODEL.lag(belief.theta) == pytest.approx(MODEL.lag(twice), rel=0.35)
+
+
 def test_a_loss_is_never_more_than_power_can_hold():
     hopeless = TRUE + np.array([0.0] * 5 + [0.3])
     belief = learnt(plant(moving(300), hopeless, noise_k=0.002))

@@ -45,6 +45,20 @@ def test_the_first_block_foreseen_is_what_its_regressor_says(seed):
     assert model.foreseen(theta, changes_k, u, 0.4, 1) == pytest.approx([float(phi @ theta)])
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6))
+def test_what_is_under_way_is_what_comes_if_power_only_holds(seed):
+    rng = np.random.default_rng(seed)
+    model, theta = random_model(rng)
+    poles = rng.uniform(0.0, 0.8, 2)[: model.n - 1]
+    theta[: model.n - 1] = np.poly(poles)[1:] if len(poles) else ()
+    theta[model.inputs] = rng.uniform(0.1, 1.0, model.m)
+    changes_k, u, holding = rng.normal(0.0, 1.0, 4), rng.uniform(0.0, 1.0, 10), model.holding(theta)
+    under_way_k = model.under_way_k(theta, changes_k, u - holding)
+    foreseen = model.foreseen(theta, changes_k, u, holding, 200)
+    assert foreseen[-1] == pytest.approx(under_way_k, abs=1e-6)
+
+
 def test_holding_power_ends_every_change():
     model, theta = ChangeModel(3, 2, 1), np.array([-0.5, 0.1, 0.2, 0.1, 0.09])
     holding = model.holding(theta)

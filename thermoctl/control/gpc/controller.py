@@ -12,6 +12,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from thermoctl.control.gpc.beyond import Beyond
 from thermoctl.control.gpc.doubt import Doubt
 from thermoctl.control.gpc.learning import Learner, Learnt
 from thermoctl.control.gpc.model import ChangeModel
@@ -74,7 +75,8 @@ class SelfTuningGpc:
 
     .. math::
 
-        J = \sum_{j=1}^{N} (\hat y(t+j) - r)^2 + \lambda \sum_{i=1}^{N_u} \Delta u_i^2
+        J = \sum_{j=1}^{N} (\hat y(t+j) - r)^2 + N \sum_{k=2}^{4} (\hat z(t+kN) - r)^2
+            + \lambda \sum_{i=1}^{N_u} \Delta u_i^2
 
     The model is one of block means; it is learnt at every sample, whoever steers, and needs no
     settings. Only the first of the powers is given, and at the next sample all is reckoned anew.
@@ -90,7 +92,8 @@ class SelfTuningGpc:
     model_period_s : float
         Length of a block, about half of the lag; at least one period is taken.
     horizon_s : float
-        How far it looks ahead: longer than model and lag, at most 200 blocks.
+        How far it looks ahead through the model: longer than most of the lag, at most 200 blocks.
+        Three times as far again it counts heat alone.
     moves : int
         Blocks with a power of their own, 1 to 6; the last of these powers is kept to the end.
     move_weight : float
@@ -124,6 +127,7 @@ class SelfTuningGpc:
     action: Literal["heat", "cool"] = "heat"
     learner: Learner = field(init=False, repr=False, compare=False)
     length: int = field(init=False, repr=False, compare=False)
+    beyond: Beyond = field(init=False, repr=False, compare=False)
 
     name: ClassVar[str] = "self-tuning-gpc"
 
@@ -155,6 +159,7 @@ class SelfTuningGpc:
         length = max(round(self.horizon_s / block_s), model.u_memory + 1, self.moves)
         object.__setattr__(self, "learner", learner)
         object.__setattr__(self, "length", length)
+        object.__setattr__(self, "beyond", Beyond(length, self.moves))
 
     def _check_horizon(self, model: ChangeModel) -> None:
         """Refuse a horizon within which a power would not show."""
@@ -255,11 +260,15 @@ class SelfTuningGpc:
         learner, theta = self.learner, belief.learnt.theta
         model, length = learner.model, self.length
         changes_k, powers = self._pasts(record)
-        moved = model.foreseen(theta, changes_k, powers, 0.0, length)
-        errors_k = setpoint_c - self._mean_c(record) - np.array(moved)
+        error_k, gain_k = setpoint_c - self._mean_c(record), model.gain_k(theta)
+        errors_k = error_k - np.array(model.foreseen(theta, changes_k, powers, 0.0, length))
         step_k = np.array(model.step_response(theta, length))
-        weight = self.move_weight * model.gain_k(theta) ** 2
-        best = best_powers(errors_k, step_k, self.moves, weight, float(powers[0]), self.power_max)
+        weight = self.move_weight * gain_k * gain_k
+        holding = model.holding(theta)
+        rest_k = error_k - model.under_way_k(theta, changes_k, powers - holding)
+        later = self.beyond.cost(rest_k, gain_k * holding, gain_k)
+        last, most = float(powers[0]), self.power_max
+        best = best_powers(errors_k, step_k, self.moves, weight, last, most, later)
         power = clamp(float(best[0]), 0.0, self.power_max)
         doubted = belief.doubt.holds_back(learner.size)
         return belief, min(power, belief.trusted) if doubted else power

@@ -221,18 +221,19 @@ class Learner:
     def _projected(self, theta: Array, P: Array) -> Array:
         """Return theta as a heated vessel can have it.
 
-        No b is negative, poles lie inside, and the gain has its sign: without it a law that
-        divides by the gain would heat what is too hot.
+        Poles are those of lags in a row, no b is negative, and the gain has its sign: without it a
+        law that divides by the gain would heat what is too hot.
         """
         model, poles = self.model, self.model.n - 1
+        slowest = math.exp(-self.block_s / POLE_MAX_S)
+        theta = _toward_lags(theta, P, poles, slowest)
         for j in range(poles, poles + model.m):
             if theta[j] < 0.0:  # the rest follows by its correlation
                 theta = theta - P[j] * (theta[j] / P[j, j])
         theta = theta.copy()
         b = theta[model.inputs]
         np.maximum(b, 0.0, out=b)
-        slowest = math.exp(-self.block_s / POLE_MAX_S)
-        theta[:poles] = _inside(theta[:poles].tolist(), slowest)
+        theta[:poles] = _of_lags(theta[:poles].tolist(), slowest)
         least_k = self.gain_min_k * (1.0 + float(theta[:poles].sum()))
         b += max(least_k - float(b.sum()), 0.0) / model.m
         full_k = float(b.sum())
@@ -246,18 +247,45 @@ def _followed(noise: float, e: float, samples: int) -> float:
     return max(followed, NOISE_MIN_K**2)
 
 
-def _inside(a: list[float], radius: float) -> list[float]:
-    """Return the a's of at most two poles, drawn in until both lie within `radius`."""
+def _toward_lags(theta: Array, P: Array, poles: int, slowest: float) -> Array:
+    """Return theta with poles about as `_of_lags`, the rest following by its correlation.
+
+    A pole that is no lag's is moved to where one may be, and the other one stays. A pair is moved
+    together by the least that P allows: its sum kept, a vessel of several litres to the kilowatt
+    seems a third slower than it is.
+    """
+    a = theta[:poles].tolist()
+    square = a[0] * a[0] - 4.0 * a[1] if poles == 2 else 0.0
+    if square < 0.0:
+        slope = np.array((2.0 * a[0], -4.0))
+        across: Array = P[:, :2] @ slope
+        moved: Array = theta - across * (square / float(slope @ across[:2]))
+        return moved
+    lags = _of_lags(a, slowest)
+    if lags is a:
+        return theta
+    gone = np.linalg.solve(P[:poles, :poles], np.array(lags) - theta[:poles])
+    return theta + P[:, :poles] @ gone
+
+
+def _of_lags(a: list[float], slowest: float) -> list[float]:
+    """Return `a` if its one or two poles are those of lags, else the a's of lags nearby.
+
+    Heat only ever spreads: what it passes are lags, whose poles are real and lie in [0, 1). A pole
+    below 0 or a pair that swings fits a slow beginning as well as a second lag does, and foretells
+    what no vessel does.
+    """
     if not a:
         return a
-    farthest = abs(a[0])
-    if len(a) == 2:
-        square = a[0] * a[0] - 4.0 * a[1]
-        farthest = 0.5 * (abs(a[0]) + math.sqrt(square)) if square >= 0.0 else math.sqrt(a[1])
-    if farthest <= radius:
+    if len(a) == 1:
+        return a if -slowest <= a[0] <= 0.0 else [-clamp(-a[0], 0.0, slowest)]
+    square = a[0] * a[0] - 4.0 * a[1]
+    root = math.sqrt(max(square, 0.0))
+    fast, slow = 0.5 * (-a[0] - root), 0.5 * (-a[0] + root)
+    if square >= 0.0 <= fast and slow <= slowest:
         return a
-    drawn = radius / farthest
-    return [each * drawn ** (i + 1) for i, each in enumerate(a)]
+    fast, slow = clamp(fast, 0.0, slowest), clamp(slow, 0.0, slowest)
+    return [-(fast + slow), fast * slow]
 
 
 def _frozen(values: Array) -> Array:

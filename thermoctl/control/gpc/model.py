@@ -99,6 +99,25 @@ class ChangeModel:
         poles = float(a @ np.arange(1.0, float(self.n)))
         return numerator / float(b.sum()) - poles / (1.0 + float(a.sum()))
 
+    def under_way_k(self, theta: Array, changes_k: Array, powers: Array) -> float:
+        """Return what is still to come of the past if power only holds, in K.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (parameters,)
+            The model.
+        changes_k : ndarray, shape (n - 1,) or longer
+            Past changes, newest first.
+        powers : ndarray, shape (delay + m - 2,) or longer
+            Past powers less the one that holds, newest first.
+        """
+        values, poles = theta.tolist(), self.n - 1
+        given, changes = powers.tolist(), changes_k.tolist()
+        felt = self.delay - 1  # newest powers that a b has not met yet
+        moved = sum(b * sum(given[: felt + k]) for k, b in enumerate(values[self.inputs]))
+        moved -= sum(a * sum(changes[: i + 1]) for i, a in enumerate(values[:poles]))
+        return float(moved / (1.0 + sum(values[:poles])))
+
     def foreseen(
         self, theta: Array, changes_k: Array, powers: Array, power: float, length: int
     ) -> list[float]:

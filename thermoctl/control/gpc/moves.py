@@ -26,7 +26,13 @@ _SLACK = 1e-9
 
 
 def best_powers(
-    errors_k: Array, step_k: Array, moves: int, weight: float, last: float, most: float
+    errors_k: Array,
+    step_k: Array,
+    moves: int,
+    weight: float,
+    last: float,
+    most: float,
+    later: tuple[Array, Array] | None = None,
 ) -> Array:
     """Return the `moves` powers of least cost; the last of them is then kept.
 
@@ -44,6 +50,8 @@ def best_powers(
         The power before the first move.
     most : float
         Powers lie in [0, most].
+    later : tuple of ndarray, shapes (moves, moves) and (moves,), or None
+        H and g of a cost beyond those errors; see `bounded_minimum`.
     """
     length = len(step_k)
     response = np.zeros((length, moves))  # to each power for as long as it lasts
@@ -60,6 +68,9 @@ def best_powers(
         H[i, i + 1] -= weight
         H[i + 1, i] -= weight
     g[0] += weight * last
+    if later is not None:
+        H += later[0]
+        g += later[1]
     return bounded_minimum(H, g, most)
 
 
