@@ -17,6 +17,7 @@ from thermoctl.quantities import clamp
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.foretold import Settling, Slip
 from thermoctl.regulator.guard import Failure
+from thermoctl.regulator.left_alone import Beyond, LeftAlone
 from thermoctl.regulator.supervisor import Emit
 from thermoctl.signals import Alarm, Feasible, Mode
 
@@ -123,6 +124,7 @@ class Feasibility:
         self._reading_c = math.nan
         self._unseen_s = 0.0
         self._slip, self._settling = Slip(), Settling()
+        self._alone = LeftAlone()
         self._failed = False
         self._standings = {UNREACHABLE: Standing(), DRIVEN: Standing()}
         self.known = Feasible()
@@ -172,6 +174,7 @@ class Feasibility:
         """Begin anew, with nothing known."""
         self._belief, self._gathered, self._before = None, Gathered(), Gathered()
         self._heat, self.known = 0.0, Feasible()
+        self._alone.clear()
 
     def fail(self, failure: Failure) -> None:
         """Forget what could not be reckoned with, and say so once.
@@ -246,11 +249,29 @@ class Feasibility:
         slower = wanted.ramp_s > arrival.mean
         return Known(wanted.ramp_s, LAG_DOUBT * lag_s) if slower else arrival
 
+    def _driven_sds(self, belief: HeatBelief, wanted: Wanted, none: bool) -> float:
+        """Return by how many standard deviations a plant without power is driven.
+
+        It leaves the set point behind, or does not come back to it: something else heats what
+        should be heated, the air or an output that is stuck at too little for `heater.stuck_on`.
+        """
+        sign = -1.0 if wanted.power_cools else 1.0
+        here_c, gain = sign * belief.x[heat_loss.T], sign * belief.gain
+        self._alone.seen(here_c)
+        beyond = here_c - sign * wanted.setpoint_c >= BEYOND_K
+        if not (none and beyond and belief.gain_known and gain > 0.0):
+            self._alone.clear()
+            return 0.0
+        away = heat_loss.spare(belief, sign * here_c, 0.0, belief.ahead_k)
+        plant = Beyond(here_c, gain, -sign * away.mean)
+        missing = self._alone.missing(plant, self._before.span_s, math.sqrt(belief.R))
+        return max(sign * away.mean / away.sd, SURE_SDS * missing)
+
     def _tell(self, belief: HeatBelief, wanted: Wanted, t_s: float) -> None:
         """Raise the alarms, or clear them."""
         full, none = self._heat >= FULL * wanted.power_max, self._heat <= NONE
         missing_sds = _missing_sds(belief, wanted, full)
-        driven_sds = _driven_sds(belief, wanted) if none else 0.0
+        driven_sds = self._driven_sds(belief, wanted, none)
         for code, sds, words in (
             (UNREACHABLE, missing_sds, _missing_words),
             (DRIVEN, driven_sds, _driven_words),
@@ -287,21 +308,6 @@ def _missing_sds(belief: HeatBelief, wanted: Wanted, full: bool) -> float:
         return slow if full else 0.0
     there = heat_loss.spare(belief, wanted.setpoint_c, wanted.power_max, straight=True)
     return max(slow, -towards * there.mean / there.sd)
-
-
-def _driven_sds(belief: HeatBelief, wanted: Wanted) -> float:
-    """Return by how many standard deviations a plant without power leaves the set point behind.
-
-    Something else heats what should be heated: the air, or an output that is stuck at too little
-    for `heater.stuck_on`.
-    """
-    here_c = belief.x[heat_loss.T]
-    sign = -1.0 if wanted.power_cools else 1.0
-    wired_so = belief.gain_known and sign * belief.gain > 0.0
-    if not wired_so or sign * (here_c - wanted.setpoint_c) < BEYOND_K:
-        return 0.0
-    here = heat_loss.spare(belief, here_c, 0.0, belief.ahead_k)
-    return sign * here.mean / here.sd
 
 
 def _driven_words(_: Feasible, belief: HeatBelief, wanted: Wanted) -> str:

@@ -145,6 +145,24 @@ def test_heat_that_nobody_asked_for_is_told(stuck, after_s):
     assert "come to 40 degC without power, it moves by +" in step.alarms[0].text
 
 
+def test_an_output_at_little_more_than_what_holds_is_told_when_the_water_does_not_come_back():
+    tank = Tank(8.0, 1500.0, 12.0, setpoint_c=40.0)
+    assert codes(tank.run(1500)) == []
+    tank.shorted = 12.0 * 18.0 / 1500.0 + 0.02
+    assert codes(tank.run(2700)) == [DRIVEN]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_small_plant_that_stands_far_above_its_set_point_without_power_is_told(seed):
+    check = {"enabled": False}
+    plant = Tank(5e-4, 1.0, 0.023, seed=seed, setpoint_c=50.0, heater_check=check)
+    plant.shorted = 1.0
+    step = plant.run(1200)
+    assert step.command.power == 0.0
+    assert plant.water_c > 64.0
+    assert codes(step) == [DRIVEN]
+
+
 def test_water_that_cools_down_to_its_set_point_or_rests_above_it_is_not_driven():
     tank = Tank(2.0, 300.0, 4.0, setpoint_c=40.0)
     tank.run(900)

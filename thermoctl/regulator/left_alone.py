@@ -1,0 +1,91 @@
+"""Whether a plant that gets no power comes back from beyond its set point.
+
+A balance of heat learns whatever goes on for long: an output that is stuck on becomes a plant that
+loses nothing, and one that stands far beyond its set point is then in order. What it lost before
+the power went is not learnt from what came after it. A plant that is left alone loses a good part
+of that, as long as it is not colder; one that does not is heated by something else.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from thermoctl.control.heat_loss import WARMS_AT_MOST_K
+from thermoctl.quantities import clamp
+from thermoctl.regulator.heat_known import OFF_LAGS
+from thermoctl.regulator.heat_response import LAGS_S
+
+WAITS_S = OFF_LAGS * LAGS_S[-1]
+"""Heat is under way for no longer, whatever the lag."""
+LOSES = 0.1
+"""So much of a loss that was believed is left at least: what goes into a cold wall looks like five
+times what is lost, and in the end the wall is warm."""
+LEFT_K, LEFT_SDS = 0.5, 5.0
+"""What is missing adds up to a doubt beyond these, in K and in standard deviations of a reading."""
+MOST = 2.0
+"""It adds up to no more than so many times that: when the plant comes back, it is soon over."""
+
+
+class Beyond(NamedTuple):
+    """A plant beyond its set point, counted in the direction in which power drives.
+
+    Parameters
+    ----------
+    reading_c : float
+        Where it is.
+    gain, loss : float
+        Rate at full power and the opposite one without, in K/s, as they are believed now.
+    """
+
+    reading_c: float
+    gain: float
+    loss: float
+
+
+class LeftAlone:
+    """Follows a plant from the moment on when it gets no power."""
+
+    def __init__(self) -> None:
+        self._lowest_c = math.inf
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin anew when there is no power the next time."""
+        self._alone_s = self._missing_k = self._loss = 0.0
+        self._from_c = self._before_c = math.nan
+
+    def seen(self, reading_c: float) -> None:
+        """Take in where the plant is; as low as it was once it may be at rest."""
+        self._lowest_c = min(self._lowest_c, reading_c)
+
+    def missing(self, beyond: Beyond, span_s: float, sd_k: float) -> float:
+        """Return how much is missing after another `span_s` without power; 1 is a doubt.
+
+        Parameters
+        ----------
+        beyond : Beyond
+            The plant at the end of it.
+        span_s : float
+            How long, in s.
+        sd_k : float
+            Standard deviation of its reading.
+        """
+        reading_c, before_c = beyond.reading_c, self._before_c
+        if math.isnan(self._from_c):
+            least = beyond.gain * (reading_c - self._lowest_c) / WARMS_AT_MOST_K
+            self._from_c, self._loss = reading_c, max(beyond.loss, least)
+        self._alone_s += span_s
+        self._before_c = reading_c
+        limit_k = max(LEFT_K, LEFT_SDS * sd_k)
+        if self._alone_s > WAITS_S and self._loss > 0.0:
+            rise_k = min(reading_c - before_c, beyond.gain * span_s)  # hot water is no fault
+            missing_k = self._missing_k + rise_k + LOSES * self._loss_at(reading_c) * span_s
+            self._missing_k = clamp(missing_k, 0.0, MOST * limit_k)
+        return self._missing_k / limit_k
+
+    def _loss_at(self, reading_c: float) -> float:
+        """Return what it lost at the beginning, less in proportion where it is colder by now."""
+        if reading_c >= self._from_c:
+            return self._loss
+        return self._loss * (reading_c - self._lowest_c) / (self._from_c - self._lowest_c)
