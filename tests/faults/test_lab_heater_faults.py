@@ -46,11 +46,13 @@ class Lab:
         self.heat = start(self.parameters)
         self.sensor_c, self.t_s, self.power = self.heat.first_c, 0.0, 0.0
         self.does, self.fallen, self.steps = lambda power: power, False, []
+        self.stands_c = math.nan  # where a reading stands still, but for its noise
 
     def live(self, seconds):
         for _ in range(seconds):
             self._warm()
-            counts = self.acquisition.convert(TMP36.volts(self.sensor_c))
+            seen_c = self.sensor_c if math.isnan(self.stands_c) else self.stands_c
+            counts = self.acquisition.convert(TMP36.volts(seen_c))
             raw = RawSample(self.t_s, float(counts), self.scale)
             told = self.regulator.step(self.sensor.measure(raw, self.t_s))
             self.power = round(255.0 * told.command.power) / 255.0
@@ -116,3 +118,20 @@ def test_a_fault_of_a_lab_ends_latched_by_its_name(controller, fault, at_s, latc
         assert code in codes
         assert lab.power == 0.0
         assert top_c - began_c < rise_k
+
+
+@pytest.mark.parametrize("controller", ["adaptive", "pid"])
+@pytest.mark.parametrize("below_k", [1.0, 3.0])
+@pytest.mark.slow
+def test_a_reading_that_stands_still_below_the_set_point_of_a_lab_is_latched(controller, below_k):
+    for seed in range(4):
+        lab = Lab(controller, seed)
+        lab.live(1500)
+        lab.stands_c, began_c = 50.0 - below_k, lab.heat.first_c
+        top_c, after_s = -math.inf, 0
+        while lab.live(1).state is not State.LATCHED:
+            after_s += 1
+            top_c = max(top_c, lab.heat.first_c)
+            assert after_s < 400, seed
+        print(f"{controller}, lab {seed}: latched after {after_s} s, {top_c - began_c:+.1f} K")
+        assert top_c - began_c < 25.0

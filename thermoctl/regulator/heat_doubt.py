@@ -30,12 +30,23 @@ CALM, CALM_SDS = 0.1, 2.0
 the model may follow; were it to follow the quiet half of the noise only, it would drift."""
 HALF = 0.5
 """So much of the heat may be missing: the gain of a tank whose water was doubled."""
+MUCH_SHARE, GROWS_SHARE = 0.4, 0.15
+"""Where the loss takes more of full power than the first, that would leave too little to be missed
+when a reading stands still: half of what the loss leaves may be missing, or the second of full
+power, for a loss that grows at once is no fault. That is of a reading that stands still; what falls
+faster, as with ice in the water, says nothing of the heater."""
+ANSWERED_S = 1800.0
+"""For so long after a good answer it is half of the heat all the same: an element of which half has
+burnt out would be asked again and again."""
 FULL_SHARE = 0.02
 """And so much of full power: loss that wanders."""
 EXTRA_GAINS, EXTRA_SHARE = 2.5, 0.3
 """So many times the gain, and so much of full power besides, is no stuck output."""
 SURE_SHARE = 0.7
 """What a plant loses at least, of what its cooling says."""
+COOLED_S = 100.0
+"""It is remembered for so long: an output that no longer obeys teaches a gain without it, by which
+what goes on rising is in order."""
 MEMORY_S, MEMORY_LAGS = 300.0, 10.0
 """Memory of the quiet rates."""
 FOLLOWS_SDS = 4.0
@@ -89,6 +100,8 @@ class HeatDoubt:
         self._stood_c = self._proven_c = math.nan
         self._stood_s = self._stood_power = self._proven_power = 0.0
         self._settle_s = self._needed = self._needed_s = 0.0
+        self._answered_s = 0.0
+        self._cools_per_s = self._cools_loss = self._cools_s = 0.0
         self.since: Seen | None = None
         self.clear()
 
@@ -100,6 +113,7 @@ class HeatDoubt:
     def trust(self) -> None:
         """Take the loss for what it is now: the heater was asked, and answers."""
         self._stood_power = self._proven_power = self._needed
+        self._answered_s = ANSWERED_S
 
     def distrust(self, gain: Gain, fell: float) -> None:
         """Take for the loss no more than the reading `fell` without power, in K/s.
@@ -150,27 +164,31 @@ class HeatDoubt:
         jumped: bool,
         follow: bool,
         again: bool = False,
+        proven: bool = True,
     ) -> None:
         """Add what happened from `before` to `now`; quiet rates `follow` if they may.
 
         After a bad answer, `again`, no loss has to be forgiven that has not been seen yet: of the
-        rise that is left by the loss, not of the heat, half may be missing.
+        rise that is left by the loss, not of the heat, half may be missing. So it is where the loss
+        is large, of a heater that is `proven` to obey less power.
         """
         span_s, rise_k = now.t_s - before.t_s, now.reading_c - before.reading_c
         heat_k = gain.mean * (now.heat_s[gain.place] - before.heat_s[gain.place])
         full_k = gain.mean * span_s
         self._coldest_c = min(self._coldest_c, now.reading_c)
+        self._cool(gain, span_s)
         loss_k = self.loss(gain) * span_s
         loss_k += self._unseen(gain, now.reading_c) * span_s
-        missing_k = clamp(heat_k - loss_k - rise_k, -2.0 * full_k, heat_k)
-        spared_k = HALF * (max(heat_k - loss_k, 0.0) if again else heat_k)
-        missing_k += self._missing_k - spared_k - FULL_SHARE * full_k
+        self._answered_s -= span_s
+        large = proven and self._answered_s <= 0.0 and loss_k > MUCH_SHARE * full_k
+        missing_k = self._missing_k - FULL_SHARE * full_k
+        missing_k += _missing_k(heat_k, loss_k, rise_k, full_k, again=again, large=large)
         if self._missing_k == 0.0:
             self.since = before
         self._missing_k = max(0.0, missing_k)
         self._settle_s = SETTLE_S if jumped else self._settle_s - span_s
         if self._settle_s <= 0.0:
-            extra_k = rise_k + self._sure_loss(gain, now.reading_c) * span_s - EXTRA_GAINS * heat_k
+            extra_k = rise_k + self._sure_loss(now.reading_c) * span_s - EXTRA_GAINS * heat_k
             extra_k = clamp(extra_k, -full_k, full_k) - EXTRA_SHARE * full_k
             self._extra_k = max(0.0, self._extra_k + extra_k)
         if follow and not jumped and self.calm(gain, block.sd_k):
@@ -187,13 +205,22 @@ class HeatDoubt:
             return above_k * max(gain.cools_per_s, 1.0 / COOLS_WITHIN_S)
         return above_k * SURE_SHARE * gain.cools_per_s
 
-    def _sure_loss(self, gain: Gain, reading_c: float) -> float:
+    def _cool(self, gain: Gain, span_s: float) -> None:
+        """Remember how fast the plant surely cooled a while ago."""
+        self._cools_s -= span_s
+        if gain.cools_per_s > 0.0:
+            self._cools_s = COOLED_S
+        elif self._cools_s > 0.0:
+            return
+        self._cools_per_s, self._cools_loss = gain.cools_per_s, self.loss(gain)
+
+    def _sure_loss(self, reading_c: float) -> float:
         """Return how fast a reading surely falls without power, in K/s.
 
         A plant that cools faster the hotter it is lost nothing at least where it was coldest.
         """
-        cools = SURE_SHARE * gain.cools_per_s * (reading_c - self._coldest_c)
-        return min(self.loss(gain), max(cools, 0.0))
+        cools = SURE_SHARE * self._cools_per_s * (reading_c - self._coldest_c)
+        return min(self._cools_loss, max(cools, 0.0))
 
     def _follow(self, before: Seen, now: Seen, rise_k: float, lag_s: float) -> None:
         """Let the quiet rates follow those of a block."""
@@ -264,6 +291,19 @@ class HeatDoubt:
             f"expected {expected_k:+.2f} +-{sd_k:.2f} K in {span_s:.0f} s at "
             f"{heat_s / span_s:.0%} power, got {now.reading_c - since.reading_c:+.2f} K"
         )
+
+
+def _missing_k(
+    heat_k: float, loss_k: float, rise_k: float, full_k: float, *, again: bool, large: bool
+) -> float:
+    """Return what is missing in a block beyond what may be, in K; see `MUCH_SHARE` for `large`."""
+    left_k = max(heat_k - loss_k, 0.0)
+    missing_k = clamp(heat_k - loss_k - rise_k, -2.0 * full_k, heat_k)
+    missing_k -= HALF * (left_k if again else heat_k)
+    if not large:
+        return missing_k
+    spared_k = max(HALF * left_k, min(HALF * heat_k, GROWS_SHARE * full_k))
+    return max(missing_k, left_k - max(rise_k, 0.0) - spared_k)
 
 
 def _limit_k(gain: Gain, sd_k: float, lags: float) -> float:

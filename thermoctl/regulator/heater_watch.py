@@ -12,7 +12,7 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-from thermoctl.regulator import heat_climb, heat_question
+from thermoctl.regulator import heat_climb, heat_question, heat_trial
 from thermoctl.regulator.heat_blocks import Blocks, Repeats
 from thermoctl.regulator.heat_check import HeaterCheck
 from thermoctl.regulator.heat_climb import Climb
@@ -88,6 +88,7 @@ class HeaterWatch:
         self._cut: _Cut | None = None
         self._t_s = self._off_s = 0.0
         self._failed_s = -math.inf
+        self._refused_c = -math.inf  # what an unknown one that answered badly has to rise beyond
         self._distrusted_k = 0.0  # heat that must be answered before anything is learnt again
         self._trial = Trial(check)
 
@@ -159,7 +160,7 @@ class HeaterWatch:
         if self._cut is not None:
             self._hear(self._cut, block, now, t_s)
             return
-        if learns:
+        if learns and (self.known is not None or now.reading_c > self._refused_c):
             self._heater.learn(self._response.gain, now)
             self._heater.follow(block.power, now)
         if before is not None:
@@ -195,7 +196,10 @@ class HeaterWatch:
         doubt, sd_k, jumped = self._doubt, block.sd_k, self._response.jumped
         again = self._distrusted_k > 0.0
         follow = not again and self._climb.calm(sd_k)
-        doubt.compare(known, block, before, now, jumped=jumped, follow=follow, again=again)
+        proven = self._heater.proven
+        doubt.compare(
+            known, block, before, now, jumped=jumped, follow=follow, again=again, proven=proven
+        )
         if again and doubt.calm(known, sd_k):
             heat_s = now.heat_s[known.place] - before.heat_s[known.place]
             self._distrusted_k -= known.mean * heat_s
@@ -312,6 +316,8 @@ class HeaterWatch:
             return
         if self._heater.gain is None and self._t_s - self._failed_s >= LATELY_S:
             self._failed_s = self._t_s
+            asked_c = [row.reading_c for row in self._rows if row.t_s >= cut.from_s]
+            self._refused_c = max(asked_c) + heat_trial.RISE_K  # one that falls bends like a lag
             self._trial.insist(self._t_s)
             self._go_on()
             return
