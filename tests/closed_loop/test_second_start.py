@@ -101,20 +101,7 @@ def settled_s(cycles):
     return float(np.argmax(held)) if held.any() else np.inf
 
 
-SLOWER = pytest.mark.xfail(
-    strict=True,
-    reason="since power is heard for longer (decision 30) it takes 697 s, and passes by nothing; "
-    "before it took 668",
-)
-
-
-@pytest.mark.parametrize(
-    "row",
-    [
-        pytest.param(row, id=row.name, marks=[SLOWER] if row.name == "three times the lag" else [])
-        for row in ROWS
-    ],
-)
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
 def test_a_start_with_the_model_of_the_rig_meets_its_figures(row, store):
     remembered, warning = store.load("tank")
     assert warning is None

@@ -392,20 +392,24 @@ def test_power_that_has_far_to_go_is_at_its_limit_at_once_and_noise_moves_it_lit
 
 
 @pytest.mark.parametrize(
-    ("lag_s", "gain", "times"), [(20.0, 0.036, 1.0), (20.0, 0.09, 1.5), (20.0, 0.3, 3.0)]
+    ("lag_sd_s", "gain", "times"),
+    [(0.0, 0.036, 1.0), (0.0, 0.16, 2**0.5), (7.0, 0.032, 51**0.5 * 0.2), (2.0, 0.3, 3.0)],
 )
-def test_with_much_heat_under_way_the_power_is_calmer_up_to_three_times(lag_s, gain, times):
-    near = Outlook(coasting_c=37.4, holding_power=0.2, lag_s=lag_s, gain=gain)
-    Tc_s = times * 0.4 * lag_s
+def test_what_a_mistaken_lag_may_cost_makes_the_power_calmer_up_to_three_times(
+    lag_sd_s, gain, times
+):
+    near = Outlook(37.4, 0.2, 20.0, gain, lag_sd_s=lag_sd_s)
+    Tc_s = times * 0.4 * 20.0
     moved = power_for(near, 37.5, 0.4, 1.0, (-9.0, 9.0), before=0.2) - 0.2
-    assert moved == pytest.approx(0.1 / (gain * Tc_s) / (1.0 + Pace().smoothness * Tc_s))
+    expected = 0.1 / (gain * Tc_s) / (1.0 + Pace().smoothness * Tc_s)
+    assert moved == pytest.approx(expected)
 
 
 def counted(surplus, gain=0.036, least=0.0):
     """Return as how much power a surplus in the heater counts, well within the limits."""
     near = Outlook(37.5, 0.5, 20.0, gain, heater_k=gain)
     asked = power_for(near._replace(surplus=surplus), 37.5, 0.4, 1.0, (least, 1.0), before=0.5)
-    Tc_s = 0.4 * 20.0 * min(max(gain * 20.0 / 1.2, 1.0), 3.0)
+    Tc_s = 0.4 * 20.0 * max(gain * 2**0.5 / 0.16, 1.0)
     return surplus - (asked - 0.5) * (1.0 + Pace().smoothness * Tc_s) * Tc_s
 
 
@@ -428,7 +432,7 @@ def test_on_the_move_more_of_it_counts_the_more_is_under_way():
 ])  # fmt: skip
 def test_what_hypotheses_do_not_agree_upon_is_not_acted_on(off_k, bounds, left_k):
     told = Outlook(37.5 + off_k, 0.2, 20.0, 0.12, spread_k=0.25)
-    Tc_s = 2.0 * 0.4 * 20.0
+    Tc_s = 0.75 * 2**0.5 * 0.4 * 20.0
     moved = power_for(told, 37.5, 0.4, 1.0, bounds, before=0.2) - 0.2
     assert moved == pytest.approx(left_k / (0.12 * Tc_s * (1.0 + Pace().smoothness * Tc_s)))
 

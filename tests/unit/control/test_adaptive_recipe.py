@@ -158,7 +158,7 @@ class PlainBank:
         if found and not jumped:
             for each in self.filters:
                 each.P[2, 2] += (0.05 * each.x[3]) ** 2
-                each.P[2:, 2:] += np.outer(0.3 * each.x[2:], 0.3 * each.x[2:])
+                each.P[2:, 2:] += np.outer(0.1 * each.x[2:], 0.1 * each.x[2:])
         if jumped:
             self.silent_until_s = self.k * self.h + 5 * likeliest.lag_s
         if jumped or found:
@@ -201,7 +201,9 @@ class PlainBank:
         *self.told, variance = w @ rows / w.sum()
         u_ss, coasting, lag, beta, heater, surplus = self.told
         spread = math.sqrt(w @ (rows[:, 1] - coasting) ** 2 / w.sum())
-        heavy = min(max(beta * lag / 1.2, 1.0), 3.0)
+        lag_sd = math.sqrt(w @ (rows[:, 2] - lag) ** 2 / w.sum())
+        mistaken = beta * math.hypot(lag_sd, 1.0, 0.05 * lag)
+        heavy = min(max(mistaken / 0.16, 1.0), 3.0)
         Tc = max(3.0, 1.5 * self.h, self.kappa * heavy * lag)
         tau, before = 0.4 * Tc, self.powers[0]
         aim = coasting + beta * tau * (before - u_ss)

@@ -62,6 +62,8 @@ class Outlook(NamedTuple):
         Standard deviation of `coasting_c` among the hypotheses.
     gain_sd : float
         Standard deviation of the gain, as each of them has it.
+    lag_sd_s : float
+        Standard deviation of the lag among the hypotheses.
     """
 
     coasting_c: float
@@ -72,6 +74,7 @@ class Outlook(NamedTuple):
     surplus: float = 0.0
     spread_k: float = 0.0
     gain_sd: float = 0.0
+    lag_sd_s: float = 0.0
 
 
 def outlook(
@@ -87,15 +90,17 @@ def outlook(
     coasting_c, holding_power = float(mean(coasting)), float(mean(holding))
     coasting *= coasting
     variance = float(mean(coasting)) - coasting_c * coasting_c
+    lag_s = float(mean(hypotheses.lag_s))
     return Outlook(  # in the order of its fields: by their names it would take twice as long
         coasting_c,
         holding_power,
-        float(mean(hypotheses.lag_s)),
+        lag_s,
         float(mean(beta)) / h,
         float(mean(hypotheses.element * beta)),
         float(mean(path.heat)) - holding_power,
         math.sqrt(max(variance, 0.0)),
         math.sqrt(float(mean(block[BETA, BETA]))) / h,
+        math.sqrt(max(float(mean(hypotheses.lag_squared)) - lag_s * lag_s, 0.0)),
     )
 
 
@@ -118,7 +123,7 @@ def power_for(
     setpoint_c : float
         Where the water is to come to rest, in degC; on a ramp, that of `ahead`.
     calmness : float
-        Tc as a share of the lag, unless much heat is under way.
+        Tc as a share of the lag, unless that is hardly known.
     period_s : float
         Time between two samples.
     bounds : tuple of float
@@ -130,15 +135,16 @@ def power_for(
     pace : Pace
         The constants of this law.
     """
-    full_k = outlook.gain * outlook.lag_s
-    heavy = clamp(full_k / pace.heavy_k, 1.0, pace.calmer)
+    floor_s = math.hypot(pace.lag_floor_s, pace.lag_floor_share * outlook.lag_s)
+    doubt_k = outlook.gain * math.hypot(outlook.lag_sd_s, floor_s)
+    heavy = clamp(doubt_k / pace.mistaken_k, 1.0, pace.calmer)
     fastest_s = max(pace.fastest_s, pace.fastest_periods * period_s)
     Tc_s = max(fastest_s, calmness * heavy * outlook.lag_s)
     tau_s = pace.smoothness * Tc_s
     resting = outlook.holding_power + ramp_power
     aim_c = outlook.coasting_c + outlook.gain * tau_s * (before - resting)
     surplus = outlook.surplus - ramp_power
-    swing_k = full_k * (bounds[1] - bounds[0])
+    swing_k = outlook.gain * outlook.lag_s * (bounds[1] - bounds[0])
     aim_c += outlook.heater_k * (_counted(surplus, swing_k, pace) - surplus)
     error_k = _agreed(setpoint_c - aim_c, outlook.spread_k, bounds, pace)
     gain_sd = min(outlook.gain_sd, pace.vague_k_per_s)
@@ -152,12 +158,9 @@ def _counted(surplus: float, swing_k: float, pace: Pace) -> float:
 
     `swing_k` is what the whole range of power has under way within a lag; a cooler adds to it.
     """
-    heavy = clamp(swing_k / pace.heavy_k, 1.0, pace.calmer)
-    moving, resting = 1.0 + pace.left_out * (heavy - pace.even), pace.resting
-    size = abs(surplus)
-    return math.copysign(
-        max(moving * size, min(resting * size, resting * pace.rest_power)), surplus
-    )
+    heavy, size = clamp(swing_k / pace.heavy_k, 1.0, pace.calmer), abs(surplus)
+    moving = (1.0 + pace.left_out * (heavy - pace.even)) * size
+    return math.copysign(max(moving, pace.resting * min(size, pace.rest_power)), surplus)
 
 
 def _agreed(error_k: float, spread_k: float, bounds: tuple[float, float], pace: Pace) -> float:

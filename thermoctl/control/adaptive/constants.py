@@ -115,7 +115,7 @@ class Plants:
     loosened_lags: float = ranged(2.0, 0.1, 100.0)
     loosened_share: float = ranged(0.08, 0.0, 1.0)
     reopened_share: float = ranged(0.05, 0.0, 1.0)
-    rescaled_share: float = ranged(0.3, 0.0, 1.0)
+    rescaled_share: float = ranged(0.1, 0.0, 1.0)
     known_share: float = ranged(0.1, 0.0, 1.0)
     gain_min_k_per_s: float = ranged(2e-5, 1e-8, 0.1)
     heat_max_k: float = ranged(60.0, 0.01, 1e5)
@@ -185,18 +185,21 @@ class Pace:
     fastest_s, fastest_periods : float
         Tc is no shorter, whatever the lag, nor shorter than so many samples: at one sample any
         error of the gain would be given back whole, and below it the loop would be unstable.
-    heavy_k, calmer : float
-        Where full power puts more than so many kelvin on their way within a lag, each tenth by
-        which the lag is mistaken is that much overshoot: Tc grows by as much, and no more than so
-        many times.
+    lag_floor_s, lag_floor_share : float
+        No lag is known better than to the first and this share of it together, whatever the weights
+        say: no plant is quite like any hypothesis.
+    mistaken_k, calmer : float
+        What full power heats in the time by which the lag may be mistaken comes as overshoot. Where
+        that is more than so many kelvin Tc grows by as much, and no more than so many times.
     smoothness : float
         The lag of the power itself, as a share of Tc. Noise costs a good deal less travel than at
         once, while a power that has far to go is at its limit at once all the same.
-    left_out, even : float
+    left_out, even, heavy_k : float
         On the move so much of the heat in the heater is left out of account. Were all of it
         counted, the error would go by Tc and the water follow as slowly as the heater; so both go
         at one pace, damped by some .85. A lag that is mistaken then costs more: where the range of
-        power has `even` times `heavy_k` under way all of that heat counts, and beyond it even more.
+        power has `even` times `heavy_k` under way within a lag all of that heat counts, and beyond
+        it even more.
     resting, rest_power : float
         Within so small a surplus of power that heat counts so many times. At rest it is the answer
         to noise that has passed, and what is taken back of it need not be cooled away.
@@ -217,11 +220,14 @@ class Pace:
 
     fastest_s: float = ranged(3.0, 0.05, 1e4)
     fastest_periods: float = ranged(1.5, 1.0, 100.0)
-    heavy_k: float = ranged(1.2, 0.01, 1e3)
+    lag_floor_s: float = ranged(1.0, 0.0, 1e4)
+    lag_floor_share: float = ranged(0.05, 0.0, 1.0)
+    mistaken_k: float = ranged(0.16, 0.001, 1e3)
     calmer: float = ranged(3.0, 1.0, 100.0)
     smoothness: float = ranged(0.4, 0.0, 10.0)
     left_out: float = ranged(0.4, 0.0, 1.0)
     even: float = ranged(2.0, 0.0, 10.0)
+    heavy_k: float = ranged(1.2, 0.01, 1e3)
     resting: float = ranged(2.2, 0.0, 10.0)
     rest_power: float = ranged(0.08, 0.0, 1.0)
     vague_share: float = ranged(0.25, 0.0, 10.0)

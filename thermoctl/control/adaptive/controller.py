@@ -85,7 +85,7 @@ class Adaptive:
     96 hypotheses about lag and its shape each learn water temperature, loss and gain; they are
     weighted by how well they predicted. The power cancels the error of the temperature at which
     the water would come to rest, within :math:`T_c = \max(3\,\mathrm{s}, 1.5\,h, \kappa L)`, or up
-    to three times that where full power has much heat under way.
+    to three times that where full power does much in the time by which the lag may be mistaken.
 
     Parameters
     ----------

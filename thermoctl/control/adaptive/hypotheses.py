@@ -40,6 +40,8 @@ class Hypotheses:
         Time from one sample to the next.
     lag_s : ndarray
         Total lag L: dead time, heater and sensor together.
+    lag_squared : ndarray
+        Its square, in s^2.
     dead : ndarray of int
         Dead time in whole periods.
     element : ndarray
@@ -55,6 +57,7 @@ class Hypotheses:
 
     period_s: float
     lag_s: Array
+    lag_squared: Array
     dead: npt.NDArray[np.intp]
     element: Array
     held: Array
@@ -90,6 +93,7 @@ class Hypotheses:
         return cls(
             period_s=float(period_s),
             lag_s=lag_s,
+            lag_squared=lag_s * lag_s,
             dead=dead.astype(np.intp),
             element=element,
             held=dead + element,
