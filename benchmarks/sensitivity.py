@@ -1,8 +1,8 @@
 """Halve and double every constant of the default law, and see what becomes of its loops.
 
 Run with ``python benchmarks/sensitivity.py FOLDER``, which takes a quarter of an hour on two
-processors and goes on from what is in the folder. Prints the rows of the table in docs/sensitivity.md: what
-moves by more than a tenth, and what misses a goal.
+processors and goes on from what is in the folder. Prints the rows of the table in
+docs/sensitivity.md: what moves by more than a tenth, and what misses a goal.
 """
 
 from __future__ import annotations
