@@ -16,8 +16,9 @@ from thermoctl.regulator.heat_response import LAGS_S, Gain
 
 SURE = 5.0
 """A gain is known from so many standard deviations on,"""
-ARRIVED_LAGS = 0.5
-"""and once heat for so many lags has arrived."""
+ARRIVED_LAGS, ARRIVED_S = 0.5, 10.0
+"""and once heat for so many lags has arrived, and for so many seconds at full power: a start in the
+middle of a warm-up finds a reading that rises by heat of before, whatever power there is now."""
 RECALLED_S = 600.0
 """So long what an earlier run knew is better than what this one has learnt."""
 NEARLY_FULL = 0.9
@@ -79,7 +80,7 @@ class KnownHeater:
             return
         if self.recalled and now.t_s < RECALLED_S:
             return
-        if now.heat_s[gain.place] > ARRIVED_LAGS * gain.lag_s:
+        if now.heat_s[gain.place] > max(ARRIVED_LAGS * gain.lag_s, ARRIVED_S):
             self.gain, self.recalled = gain, False
 
     def accept(self, shown: Gain) -> None:

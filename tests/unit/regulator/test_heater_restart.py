@@ -198,3 +198,15 @@ def test_a_reading_at_rest_or_falling_says_nothing_of_heat():
     assert math.isnan(seen([37.5 + 0.005 * (n % 3) for n in range(100)]).power)
     assert math.isnan(seen([37.5 - 0.2 * n for n in range(100)]).power)
     assert math.isnan(seen([math.nan] * 100).power)
+
+
+@pytest.mark.parametrize("lag_s", [15.0, 20.0, 30.0])
+def test_a_rise_by_heat_of_before_is_no_gain_of_the_little_power_there_is_now(lag_s):
+    for seed in range(4):
+        vessel = Vessel(lag_s=lag_s, seed=seed)
+        while vessel.water_c < 37.0:
+            vessel.warm_up(1)
+        vessel.begin()
+        for second in range(40):
+            vessel.warm_up(1, law=lambda _, power=0.25 * 0.9**second: power)
+        assert vessel.watch.known is None
