@@ -73,7 +73,7 @@ def changes(line: Line, before: str, after: str) -> Iterator[str]:
 
 def told(lines: Sequence[Line], before: str, after: str) -> str:
     """Return all changes from one law to another."""
-    return "; ".join(text for line in lines for text in changes(line, before, after)) or "–"
+    return "; ".join(text for line in lines for text in changes(line, before, after)) or "—"
 
 
 def main(folder: Path) -> None:
@@ -90,6 +90,7 @@ def main(folder: Path) -> None:
     for number, (_, result) in enumerate(finished(jobs, store, os.cpu_count() or 1), start=1):
         print(f"\r{number} of {len(jobs)}", end="", file=sys.stderr, flush=True)
         results.append(result)
+    print(file=sys.stderr)
     lines = summarise(results, texts)
     cells: dict[str, dict[float, str]] = {}
     for name, factor, text in every:

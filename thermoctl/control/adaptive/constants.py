@@ -1,7 +1,8 @@
 """Every constant of the law that a plant could want otherwise, with its range.
 
-None met so far did. What is not here is arithmetic, such as the limit on what one sample may say,
-or is forgotten within minutes, such as the first guess of the gain.
+None met so far did; ``docs/sensitivity.md`` halves and doubles them. What is not here is
+arithmetic, such as the limit on what one sample may say, or is forgotten within minutes, such as
+the first guess of the gain.
 
 Implements section 9 of ``docs/theory.md``.
 """
