@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import field, fields
 from typing import Any
 
@@ -21,12 +22,24 @@ def check_ranges(settings: Any) -> None:
     for each in fields(settings):
         if each.metadata:
             value = getattr(settings, each.name)
-            within(each.name, value, **each.metadata)
+            require(each.name, value, **each.metadata)
             if isinstance(each.default, int) and not isinstance(value, int):
                 raise ValueError(f"{each.name} must be a whole number, got {value!r}")
 
 
-def within(name: str, value: Any, minimum: float, maximum: float) -> None:
+def require(name: str, value: Any, minimum: float, maximum: float) -> None:
     """Raise ``ValueError`` naming `name` unless `value` is a number within."""
-    if not (is_finite_number(value) and minimum <= value <= maximum):
+    if not _is_within(value, minimum, maximum):
         raise ValueError(f"{name} must lie in [{minimum:g}, {maximum:g}], got {value!r}")
+
+
+def number(content: Mapping[str, Any], name: str, minimum: float, maximum: float) -> float:
+    """Return the number `name` of what was read, or raise ``ValueError``."""
+    value = content.get(name)
+    if not _is_within(value, minimum, maximum):
+        raise ValueError(f"expected {name} in [{minimum:g}, {maximum:g}], got {value!r}")
+    return float(value)  # type: ignore[arg-type]
+
+
+def _is_within(value: Any, minimum: float, maximum: float) -> bool:
+    return is_finite_number(value) and minimum <= value <= maximum

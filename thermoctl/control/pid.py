@@ -19,7 +19,7 @@ from thermoctl.control.simc import Gains
 from thermoctl.control.step_test import StepTest
 from thermoctl.ports import Situation
 from thermoctl.quantities import is_finite_number
-from thermoctl.ranges import within
+from thermoctl.ranges import require
 from thermoctl.signals import Beliefs
 
 
@@ -119,7 +119,7 @@ class Pid:
             "relay_amplitude": (0.02, 0.5),
         }
         for name, (low, high) in ranges.items():
-            within(name, getattr(self, name), low, high)
+            require(name, getattr(self, name), low, high)
         if self.tuning not in ("fixed", "simc", "relay"):
             raise ValueError(f"tuning must be 'fixed', 'simc' or 'relay', got {self.tuning!r}")
         if self.action not in ("heat", "cool", "heat-cool"):

@@ -10,7 +10,7 @@ from typing import Any
 
 from thermoctl.control.autotune import Found
 from thermoctl.control.simc import Gains
-from thermoctl.quantities import is_finite_number
+from thermoctl.ranges import number
 
 SLOPE_MIN, SLOPE_MAX = 2e-5, 0.5
 """What a heater can do to water, in K/s: 17 W in 200 l, 1,500 W in .7 l."""
@@ -49,19 +49,11 @@ def found_before(remembered: Mapping[str, Any], tuning: str, form: str, period_s
     for name, expected in same.items():
         if remembered.get(name) != expected:
             raise ValueError(f"expected {name} {expected!r}, got {remembered.get(name)!r}")
-    slope = _number(remembered, "slope_k_per_s", SLOPE_MIN, SLOPE_MAX)
-    gain_per_k = _number(remembered, "gain_per_k", 0.0, BRISKEST / (slope * period_s))
+    slope = number(remembered, "slope_k_per_s", SLOPE_MIN, SLOPE_MAX)
+    gain_per_k = number(remembered, "gain_per_k", 0.0, BRISKEST / (slope * period_s))
     if not gain_per_k > 0.0:
         raise ValueError(f"expected a positive gain_per_k, got {gain_per_k!r}")
-    integral_s = _number(remembered, "integral_s", 0.5 * period_s, INTEGRAL_MAX_S)
-    derivative_s = _number(remembered, "derivative_s", 0.0, integral_s)
+    integral_s = number(remembered, "integral_s", 0.5 * period_s, INTEGRAL_MAX_S)
+    derivative_s = number(remembered, "derivative_s", 0.0, integral_s)
     text = f"{str(remembered.get('text'))[:200]}, in an earlier run"
     return Found(Gains(gain_per_k, integral_s, derivative_s), text, slope)
-
-
-def _number(remembered: Mapping[str, Any], name: str, low: float, high: float) -> float:
-    """Return the number `name`, which must lie in [low, high]."""
-    value = remembered.get(name)
-    if not is_finite_number(value) or not low <= value <= high:  # type: ignore[operator]
-        raise ValueError(f"expected {name} in [{low:g}, {high:g}], got {value!r}")
-    return float(value)  # type: ignore[arg-type]

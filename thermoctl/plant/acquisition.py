@@ -15,8 +15,8 @@ import numpy as np
 from numpy.random import Generator
 
 from thermoctl.plant.noise import Wander
-from thermoctl.plant.parameters import require
 from thermoctl.quantities import Array
+from thermoctl.ranges import require
 
 TWO_PI = 2.0 * math.pi
 BLOCK_BURSTS = 64

@@ -6,10 +6,11 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from thermoctl.plant.parameters import REFERENCE_L, require
+from thermoctl.plant.parameters import REFERENCE_L
 from thermoctl.plant.power_stage import Output
 from thermoctl.plant.probe import Wiring
 from thermoctl.plant.tank import Tank
+from thermoctl.ranges import require
 
 SAG_S = 60.0
 DRAUGHT_S = 300.0

@@ -7,9 +7,9 @@ from thermoctl.plant.parameters import (
     WATER_J_PER_KG_K,
     WATER_KG_PER_L,
     Vessel,
-    require,
 )
 from thermoctl.plant.thermal import Heat
+from thermoctl.ranges import require
 
 LEAST_FILL = 0.1
 """Part of the nominal water that must stay in, or the heater would be dry."""

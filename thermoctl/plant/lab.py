@@ -24,9 +24,9 @@ from numpy.random import Generator
 
 from thermoctl.model.sensor import TMP36
 from thermoctl.plant.noise import Wander
-from thermoctl.plant.parameters import require
 from thermoctl.plant.tolerances import factor
 from thermoctl.quantities import ZERO_CELSIUS_K, clamp
+from thermoctl.ranges import require
 
 STEFAN_BOLTZMANN = 5.670374419e-8
 """In W/(m2 K4)."""

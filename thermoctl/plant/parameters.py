@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from thermoctl.quantities import is_finite_number
+from thermoctl.ranges import require
 
 WATER_J_PER_KG_K = 4181.0
 """Specific heat of water at 30 to 40 degC (within 0.3 % from 5 to 90 degC)."""
@@ -21,12 +21,6 @@ WATER_KG_PER_L = 0.995
 
 REFERENCE_L = 8.0
 REFERENCE_W = 1500.0
-
-
-def require(name: str, value: float, low: float, high: float) -> None:
-    """Refuse a `value` outside [low, high], NaN included; the message names it."""
-    if not (is_finite_number(value) and low <= value <= high):
-        raise ValueError(f"{name} must lie within {low:g} to {high:g}, got {value!r}")
 
 
 @dataclass(frozen=True, slots=True)

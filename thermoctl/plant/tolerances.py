@@ -9,7 +9,8 @@ from typing import Any
 
 from numpy.random import Generator
 
-from thermoctl.plant.parameters import TankParameters, require
+from thermoctl.plant.parameters import TankParameters
+from thermoctl.ranges import require
 
 VARIED: Mapping[str, tuple[str, ...]] = {
     "vessel": (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from thermoctl.quantities import is_finite_number
+from thermoctl.ranges import check_ranges, ranged
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,14 +29,11 @@ class HeaterCheck:
         An argument is outside its range.
     """
 
-    weakest_k_per_s: float = 6e-5
-    first_heat_s: float = 60.0
+    weakest_k_per_s: float = ranged(6e-5, 1e-6, 0.5)
+    first_heat_s: float = ranged(60.0, 10.0, 3600.0)
     action: Literal["heat", "cool"] = "heat"
 
     def __post_init__(self) -> None:
-        for name, low, high in (("weakest_k_per_s", 1e-6, 0.5), ("first_heat_s", 10.0, 3600.0)):
-            value = getattr(self, name)
-            if not (is_finite_number(value) and low <= value <= high):
-                raise ValueError(f"{name} must lie within {low:g} to {high:g}, got {value!r}")
+        check_ranges(self)
         if self.action not in ("heat", "cool"):
             raise ValueError(f"action must be 'heat' or 'cool', got {self.action!r}")

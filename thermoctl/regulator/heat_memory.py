@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from thermoctl.quantities import is_finite_number
+from thermoctl.ranges import number
 from thermoctl.regulator.heat_response import COOLS_MOST, LAGS_S, Gain
 
 NAME: Final = "heater-check"
@@ -45,9 +45,6 @@ def recall(model: Mapping[str, Any]) -> Gain:
     }
     if set(model) != set(ranges):
         raise ValueError(f"expected {sorted(ranges)}, got {sorted(model)}")
-    for name, (low, high) in ranges.items():
-        value = model[name]
-        if not (is_finite_number(value) and low <= value <= high):
-            raise ValueError(f"{name} must lie within {low:g} to {high:g}, got {value!r}")
-    nearest = min(range(len(LAGS_S)), key=lambda place: abs(LAGS_S[place] - model["lag_s"]))
-    return Gain(model["gain_k_per_s"], model["gain_sd_k_per_s"], nearest, model["cools_per_s"])
+    mean, sd, lag_s, cools_per_s = (number(model, name, *each) for name, each in ranges.items())
+    nearest = min(range(len(LAGS_S)), key=lambda place: abs(LAGS_S[place] - lag_s))
+    return Gain(mean, sd, nearest, cools_per_s)

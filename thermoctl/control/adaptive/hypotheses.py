@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from thermoctl.control.adaptive.constants import Lags
 from thermoctl.quantities import Array
-from thermoctl.ranges import within
+from thermoctl.ranges import require
 
 SHAPES = ((0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.05, 0.10, 0.85), (0.18, 0.31, 0.51))
 """Shares of dead time, heater and sensor: all in even parts, a slow heater, and a sensor so slow
@@ -81,7 +81,7 @@ class Hypotheses:
         ValueError
             `period_s` lies outside .05 to 3,600 s.
         """
-        within("period_s", period_s, PERIOD_MIN_S, PERIOD_MAX_S)
+        require("period_s", period_s, PERIOD_MIN_S, PERIOD_MAX_S)
         lag_s = np.repeat(lags.each_s, len(SHAPES))
         parts = np.tile(np.array(SHAPES), (lags.count, 1)).T * lag_s
         slow = parts[1:, PIPE :: len(SHAPES)]

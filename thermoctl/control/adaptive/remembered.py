@@ -27,6 +27,7 @@ from thermoctl.control.adaptive.filters import (
 from thermoctl.control.adaptive.hypotheses import SHAPES
 from thermoctl.control.adaptive.plant_belief import plant_belief
 from thermoctl.quantities import Array, is_finite_number
+from thermoctl.ranges import number
 
 KNOWN_SHARE = 0.25
 """A gain is known, and worth keeping, once its deviation is at most this share of it."""
@@ -81,11 +82,11 @@ def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBel
         if remembered.get(name) != expected:
             raise ValueError(f"expected {name} {expected!r}, got {remembered.get(name)!r}")
     gain_max = bank.plants.heat_max_k / bank.lags.shortest_s
-    rate = _number(remembered, "gain_k_per_s", GAIN_LEAST, gain_max)
-    rate_sd = _number(remembered, "gain_sd_k_per_s", 0.0, KNOWN_SHARE * rate)
-    lost = _number(remembered, "loss_k_per_s", (bank.u_min - LOSS_MIN) * rate, LOSS_MAX * rate)
-    lost_sd = _number(remembered, "loss_sd_k_per_s", 0.0, gain_max)
-    variance = _number(remembered, "noise_variance_k2", 0.0, NOISE_MAX_K2)
+    rate = number(remembered, "gain_k_per_s", GAIN_LEAST, gain_max)
+    rate_sd = number(remembered, "gain_sd_k_per_s", 0.0, KNOWN_SHARE * rate)
+    lost = number(remembered, "loss_k_per_s", (bank.u_min - LOSS_MIN) * rate, LOSS_MAX * rate)
+    lost_sd = number(remembered, "loss_sd_k_per_s", 0.0, gain_max)
+    variance = number(remembered, "noise_variance_k2", 0.0, NOISE_MAX_K2)
     log = _log_weights(remembered, len(bank.hypotheses))
     aged = math.sqrt(1.0 + max(age_s, 0.0) / DOUBLED_S)
     prior = Prior(
@@ -108,14 +109,6 @@ def _hypotheses(bank: Bank) -> dict[str, Any]:
         "shapes": [list(shape) for shape in SHAPES],
         "pipe_beyond_s": lags.pipe_beyond_s,
     }
-
-
-def _number(remembered: Mapping[str, Any], name: str, low: float, high: float) -> float:
-    """Return the number `name`, which must lie in [low, high]."""
-    value = remembered.get(name)
-    if not is_finite_number(value) or not low <= value <= high:  # type: ignore[operator]
-        raise ValueError(f"expected {name} in [{low:g}, {high:g}], got {value!r}")
-    return float(value)  # type: ignore[arg-type]
 
 
 def _log_weights(remembered: Mapping[str, Any], n: int) -> Array:

@@ -22,7 +22,7 @@ from thermoctl.control.minimum_variance import HOLDING_SD_MAX, RIDE_MAX_S
 from thermoctl.control.mirror import mirrored
 from thermoctl.ports import Situation
 from thermoctl.quantities import Array, clamp, is_finite_number
-from thermoctl.ranges import within
+from thermoctl.ranges import require
 from thermoctl.signals import Beliefs
 
 MOVES_MAX = 6
@@ -141,7 +141,7 @@ class SelfTuningGpc:
             "period_s": (0.05, 3600.0),
         }
         for name, (low, high) in ranges.items():
-            within(name, getattr(self, name), low, high)
+            require(name, getattr(self, name), low, high)
         if not is_finite_number(self.power_max) or not 0.0 < self.power_max <= 1.0:
             raise ValueError(f"power_max must lie in (0, 1], got {self.power_max!r}")
         if self.action not in ("heat", "cool"):
