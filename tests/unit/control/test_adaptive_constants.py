@@ -11,7 +11,6 @@ import pytest
 
 from thermoctl.app import plugins
 from thermoctl.control.adaptive import Adaptive
-from thermoctl.control.adaptive.bank import Bank
 from thermoctl.control.adaptive.coasting import power_for
 from thermoctl.control.adaptive.constants import Hearing, Lags, Pace, Plants
 
@@ -133,8 +132,17 @@ def test_a_bad_constant_is_told_with_its_table(options, text):
 
 
 def test_what_a_bank_of_other_lags_has_learnt_is_refused():
-    other = Adaptive(lags=Lags(longest_s=600.0))
-    told = {"action": "heat", "period_s": 1.0, "u_min": 0.0, "hypotheses": {"lags": 24}}
-    with pytest.raises(ValueError, match="expected hypotheses"):
-        other.start_from(told, 0.0)
-    assert isinstance(other.bank, Bank)
+    told = learnt(Adaptive())
+    Adaptive(pace=Pace(caution=2.0)).start_from(told, 0.0)  # which weighs no lag otherwise
+    for lags in (Lags(longest_s=600.0), Lags(count=12), Lags(pipe_beyond_s=30.0)):
+        with pytest.raises(ValueError, match="expected hypotheses"):
+            Adaptive(lags=lags).start_from(told, 0.0)
+
+
+def learnt(law):
+    """Return what `law` keeps of ten minutes of warming up and holding a vessel."""
+    vessel, belief, power = Vessel(0.036, law.period_s), law.bank.start(), 0.0
+    for _ in range(600):
+        belief = law.bank.observe(belief, vessel.after(power), power)
+        power = power_for(belief.outlook, 37.5, law.calmness, 1.0, law.bank.bounds, power)
+    return law.remember(law.start()._replace(bank=belief))
