@@ -11,7 +11,7 @@ from thermoctl.app.sim import profile
 from thermoctl.model.sensor import Sensor
 from thermoctl.plant.acquisition import Acquisition
 from thermoctl.regulator import Regulator
-from thermoctl.regulator.heat_check import HeaterCheck
+from thermoctl.regulator.heater.check import HeaterCheck
 from thermoctl.signals import Mode, RawSample, State
 from thermoctl.studies.compare.plants import plant
 from thermoctl.studies.compare.stand import stand_for

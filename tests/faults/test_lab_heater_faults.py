@@ -16,7 +16,7 @@ from thermoctl.model.sensor import TMP36, Sensor
 from thermoctl.plant.acquisition import Acquisition
 from thermoctl.plant.lab import followed, start, step
 from thermoctl.regulator import Regulator
-from thermoctl.regulator.heat_check import HeaterCheck
+from thermoctl.regulator.heater.check import HeaterCheck
 from thermoctl.signals import Mode, RawSample, State
 from thermoctl.studies.compare.plants import plant
 

@@ -29,7 +29,7 @@ from thermoctl.model import sensor as curves
 from thermoctl.model.arx import Arx, KnownGain
 from thermoctl.ports import Controller, Estimator
 from thermoctl.regulator import Limits, Plan
-from thermoctl.regulator.heat_check import HeaterCheck
+from thermoctl.regulator.heater.check import HeaterCheck
 
 HEAT, COOL, HEAT_COOL = "heat", "cool", "heat-cool"
 

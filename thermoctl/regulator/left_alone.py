@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 from thermoctl.control.heat_loss import WARMS_AT_MOST_K
 from thermoctl.quantities import clamp
-from thermoctl.regulator.heat_known import OFF_LAGS
-from thermoctl.regulator.heat_response import LAGS_S
+from thermoctl.regulator.heater.known import OFF_LAGS
+from thermoctl.regulator.heater.response import LAGS_S
 
 WAITS_S = OFF_LAGS * LAGS_S[-1]
 """Heat is under way for no longer, whatever the lag."""

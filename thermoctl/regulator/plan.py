@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from thermoctl.estimation.identifier import Identifier
 from thermoctl.ports import Controller
-from thermoctl.regulator.heat_check import HeaterCheck
+from thermoctl.regulator.heater.check import HeaterCheck
 from thermoctl.regulator.limits import Limits
 from thermoctl.signals import Mode
 

@@ -12,10 +12,10 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from thermoctl.ports import Remembered, Remembering
-from thermoctl.regulator import heat_memory
 from thermoctl.regulator.guard import Failure, attempt
-from thermoctl.regulator.heat_response import Gain
-from thermoctl.regulator.heater_watch import HeaterWatch
+from thermoctl.regulator.heater import memory as heater_memory
+from thermoctl.regulator.heater.response import Gain
+from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.mind import Mind
 from thermoctl.regulator.supervisor import Emit
 
@@ -42,13 +42,13 @@ def recall_heater(
     watch: HeaterWatch | None, remembered: Mapping[str, Remembered], emit: Emit
 ) -> None:
     """Let the `watch` over a heater begin with what is remembered of it."""
-    kept = remembered.get(heat_memory.NAME)
+    kept = remembered.get(heater_memory.NAME)
     if watch is None or kept is None:
         return
     try:
-        watch.recall(heat_memory.recall(kept.model))
+        watch.recall(heater_memory.recall(kept.model))
     except ValueError as error:
-        emit("model.ignored", controller=heat_memory.NAME, why=str(error))
+        emit("model.ignored", controller=heater_memory.NAME, why=str(error))
 
 
 def origin(mind: Mind) -> str | None:
@@ -77,5 +77,5 @@ def _remembered(held: Iterable[tuple[str, Remembering, Any]], heater: Gain | Non
         if told is not None and not isinstance(told, Failure):
             models[name] = told
     if heater is not None:
-        models[heat_memory.NAME] = heat_memory.remember(heater)
+        models[heater_memory.NAME] = heater_memory.remember(heater)
     return models

@@ -14,7 +14,7 @@ from thermoctl.ports import Controller, Remembered, Situation
 from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.feasible import Feasibility, Wanted
 from thermoctl.regulator.guard import Failure, Guard, attempt
-from thermoctl.regulator.heater_watch import HeaterWatch
+from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.judge import Verdict
 from thermoctl.regulator.learning import Learning
 from thermoctl.regulator.load import KnownLoad

@@ -6,11 +6,11 @@ from collections import deque
 import numpy as np
 import pytest
 
-from thermoctl.regulator.heat_check import HeaterCheck
-from thermoctl.regulator.heat_climb import Climb
-from thermoctl.regulator.heat_doubt import HeatDoubt, Seen
-from thermoctl.regulator.heat_response import Block, Gain
-from thermoctl.regulator.heater_watch import HeaterWatch
+from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.climb import Climb
+from thermoctl.regulator.heater.doubt import HeatDoubt, Seen
+from thermoctl.regulator.heater.response import Block, Gain
+from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import Measurement, State

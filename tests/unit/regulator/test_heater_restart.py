@@ -7,11 +7,11 @@ from collections import deque
 import numpy as np
 import pytest
 
-from thermoctl.regulator import heat_memory
-from thermoctl.regulator.heat_check import HeaterCheck
-from thermoctl.regulator.heat_past import FirstReadings
-from thermoctl.regulator.heat_response import Gain
-from thermoctl.regulator.heater_watch import HeaterWatch
+from thermoctl.regulator.heater import memory as heater_memory
+from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.past import FirstReadings
+from thermoctl.regulator.heater.response import Gain
+from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import Measurement, State
@@ -99,7 +99,7 @@ def test_a_slope_that_nobody_can_tell_proves_nothing():
 
 def recalled(vessel):
     """Return the vessel under a new watch that was told what the one before knew."""
-    known = heat_memory.recall(heat_memory.remember(vessel.watch.known))
+    known = heater_memory.recall(heater_memory.remember(vessel.watch.known))
     vessel.begin().watch.recall(known)
     return vessel
 
@@ -166,10 +166,10 @@ def test_a_remembered_heater_that_has_failed_is_latched(does):
     ],
 )
 def test_a_memory_that_makes_no_sense_is_refused_by_its_name(name, value):
-    model = heat_memory.remember(Gain(0.04, 0.001, 3, 0.001))
-    assert heat_memory.recall(model) == Gain(0.04, 0.001, 3, 0.001)
+    model = heater_memory.remember(Gain(0.04, 0.001, 3, 0.001))
+    assert heater_memory.recall(model) == Gain(0.04, 0.001, 3, 0.001)
     with pytest.raises(ValueError, match=name):
-        heat_memory.recall(model | {name: value})
+        heater_memory.recall(model | {name: value})
 
 
 def seen(readings_c, sd_k=0.01, powers=None):

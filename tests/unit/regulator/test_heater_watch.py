@@ -9,12 +9,12 @@ import pytest
 from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
 from thermoctl.errors import ConfigError
-from thermoctl.regulator.heat_blocks import Blocks, Repeats
-from thermoctl.regulator.heat_check import HeaterCheck
-from thermoctl.regulator.heat_doubt import Seen
-from thermoctl.regulator.heat_question import Answer, contrast, of_known, of_unknown
-from thermoctl.regulator.heat_response import Block, Gain, HeatResponse
-from thermoctl.regulator.heater_watch import HeaterWatch
+from thermoctl.regulator.heater.blocks import Blocks, Repeats
+from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.doubt import Seen
+from thermoctl.regulator.heater.question import Answer, contrast, of_known, of_unknown
+from thermoctl.regulator.heater.response import Block, Gain, HeatResponse
+from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import Measurement, State

@@ -1,6 +1,6 @@
 r"""How fast power made the reading rise, and whether it still does.
 
-What `heat_doubt` expects rests on a gain, a lag and a loss, and in a first warm-up none of them is
+What `doubt` expects rests on a gain, a lag and a loss, and in a first warm-up none of them is
 known: a reading that stops makes a heater with a longer lag and with as much loss as gain. That it
 has stopped needs none of them. As much power as before has to raise the reading as fast as before,
 less what a hotter plant loses more:
@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 
 from thermoctl.quantities import clamp
-from thermoctl.regulator.heat_doubt import (
+from thermoctl.regulator.heater.doubt import (
     CALM,
     CALM_SDS,
     COOLS_WITHIN_S,
@@ -31,7 +31,7 @@ from thermoctl.regulator.heat_doubt import (
     SURE_SHARE,
     Seen,
 )
-from thermoctl.regulator.heat_response import Block, Gain
+from thermoctl.regulator.heater.response import Block, Gain
 
 STRETCH_S, STRETCH_K, STRETCH_SDS = 8.0, 0.1, 6.0
 """A stretch of a climb is no shorter, and no lower than both of these."""

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from thermoctl.ranges import number
-from thermoctl.regulator.heat_response import COOLS_MOST, LAGS_S, Gain
+from thermoctl.regulator.heater.response import COOLS_MOST, LAGS_S, Gain
 
 NAME: Final = "heater-check"
 """Under which it is kept, beside the models of the laws."""

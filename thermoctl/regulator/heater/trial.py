@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 
-from thermoctl.regulator.heat_check import HeaterCheck
-from thermoctl.regulator.heat_doubt import Seen
-from thermoctl.regulator.heat_response import LAGS_S, Block
+from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.doubt import Seen
+from thermoctl.regulator.heater.response import LAGS_S, Block
 
 RISE_K, RISE_SDS = 0.1, 6.0
 """A rise beyond both is one."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from thermoctl.regulator.heat_response import Block
+from thermoctl.regulator.heater.response import Block
 
 BLOCK_S = 4.0
 NOISE_START_K2 = 1e-3

@@ -11,8 +11,8 @@ less power and the reading obeys. Until then heat may be under way for as long a
 
 from __future__ import annotations
 
-from thermoctl.regulator.heat_doubt import Seen
-from thermoctl.regulator.heat_response import LAGS_S, Gain
+from thermoctl.regulator.heater.doubt import Seen
+from thermoctl.regulator.heater.response import LAGS_S, Gain
 
 SURE = 5.0
 """A gain is known from so many standard deviations on,"""

@@ -5,7 +5,7 @@ reading besides goes on as before, and only the heater's part ends. The answer i
 
 .. math:: y = a + b\,t + c\,t^2 + \beta H_j(t)
 
-over some time with power and some without, for every lag j of `heat_response`. The parabola takes
+over some time with power and some without, for every lag j of `response`. The parabola takes
 up a plant that cools towards its surroundings. What it cannot take up leaves remainders that
 resemble their neighbours, and the error of beta is enlarged for that.
 """
@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from thermoctl.quantities import Array
-from thermoctl.regulator.heat_doubt import Seen
-from thermoctl.regulator.heat_response import LAGS_S, Gain
+from thermoctl.regulator.heater.doubt import Seen
+from thermoctl.regulator.heater.response import LAGS_S, Gain
 
 ROWS_LEAST = 6
 SURE = 4.0

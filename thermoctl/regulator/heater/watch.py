@@ -2,7 +2,7 @@
 
 A heater that is known is watched by `HeatDoubt`. One that is not yet known has so many seconds of
 full power to show a rise. Whoever is in doubt is asked: the power is cut for some lags, whatever
-the controller wants, and `heat_question` reads the answer. None, or the wrong one, is SAFE, and for
+the controller wants, and `question` reads the answer. None, or the wrong one, is SAFE, and for
 the second time LATCHED; a reading that goes on rising without power is LATCHED at once.
 """
 
@@ -12,15 +12,15 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-from thermoctl.regulator import heat_climb, heat_question, heat_trial
-from thermoctl.regulator.heat_blocks import Blocks, Repeats
-from thermoctl.regulator.heat_check import HeaterCheck
-from thermoctl.regulator.heat_climb import Climb
-from thermoctl.regulator.heat_doubt import HeatDoubt, Seen
-from thermoctl.regulator.heat_known import OFF_LAGS, KnownHeater
-from thermoctl.regulator.heat_question import BEFORE_LAGS, BEFORE_S, Answer
-from thermoctl.regulator.heat_response import Block, Gain, HeatResponse
-from thermoctl.regulator.heat_trial import Trial
+from thermoctl.regulator.heater import climb, question, trial
+from thermoctl.regulator.heater.blocks import Blocks, Repeats
+from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.climb import Climb
+from thermoctl.regulator.heater.doubt import HeatDoubt, Seen
+from thermoctl.regulator.heater.known import OFF_LAGS, KnownHeater
+from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S, Answer
+from thermoctl.regulator.heater.response import Block, Gain, HeatResponse
+from thermoctl.regulator.heater.trial import Trial
 from thermoctl.regulator.supervisor import Emit, Supervisor
 
 OFF = 0.01
@@ -173,15 +173,13 @@ class HeaterWatch:
 
     def _follow(self, block: Block, before: Seen, now: Seen) -> None:
         """Follow a climb, of a heater that is known or not; ask it when it has stalled."""
-        known, climb, jumped = self._heater.gain, self._climb, self._response.jumped
-        climb.observe(known, block, before, now, jumped=jumped)
-        if known is None and not jumped and climb.calm(block.sd_k):
+        known, rising, jumped = self._heater.gain, self._climb, self._response.jumped
+        rising.observe(known, block, before, now, jumped=jumped)
+        if known is None and not jumped and rising.calm(block.sd_k):
             self._doubt.begin(before, now)
-        if climb.stalled(block.sd_k) and block.power >= OFF:
+        if rising.stalled(block.sd_k) and block.power >= OFF:
             lag_s = 0.0 if known is None else known.lag_s
-            self._ask(
-                now, now.t_s - max(BEFORE_LAGS * lag_s, heat_climb.STALLED_S), climb.told(now)
-            )
+            self._ask(now, now.t_s - max(BEFORE_LAGS * lag_s, climb.STALLED_S), rising.told(now))
 
     def _try(self, block: Block, now: Seen) -> None:
         """Let an unknown heater show a rise; ask it when it has had its heat."""
@@ -207,9 +205,9 @@ class HeaterWatch:
         if hot and self._off_s >= self._heater.under_way_s:
             rate = self._rising(known, now, sd_k)
             if rate > 0.0:  # nothing is proven while too few readings show a slope
-                self._fail("heater.stuck_on", heat_question.told_of(rate), t_s)
+                self._fail("heater.stuck_on", question.told_of(rate), t_s)
         elif hot or (doubt.cold(known, sd_k, again=True) and block.power >= OFF):
-            lags = heat_question.CREPT_LAGS if doubt.crept else BEFORE_LAGS
+            lags = question.CREPT_LAGS if doubt.crept else BEFORE_LAGS
             from_s = self._t_s - max(lags * known.lag_s, BEFORE_S)
             since_s = from_s if doubt.since is None else min(doubt.since.t_s, from_s)
             wild = self._wild(known, since_s, WILD) or self._wild(known, from_s, WILD)
@@ -242,32 +240,30 @@ class HeaterWatch:
                 self._suspect(known)
         elif answer is not Answer.OPEN:
             self._refuse(answer, cut, shown, asked_s, t_s)
-        elif known is not None and asked_s > heat_question.longest_s(known, block.sd_k):
-            answer, shown = self._answer(cut, block.sd_k, heat_question.LIKELY)
+        elif known is not None and asked_s > question.longest_s(known, block.sd_k):
+            answer, shown = self._answer(cut, block.sd_k, question.LIKELY)
             if answer is Answer.HEATS:
                 self._emit("heater.answered", text=_LIKELY_TEXT.format(asked_s, shown.mean))
                 self._trust()
             else:
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
         elif known is None and asked_s > self._trial.listens_s(block.sd_k):
-            if self._trial.exhausted and not shown.mean > heat_question.LIKELY * shown.sd:
+            if self._trial.exhausted and not shown.mean > question.LIKELY * shown.sd:
                 self._failed_s = self._t_s  # asked often enough: nothing is left to be tried
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
                 return
             self._trial.enlarge(block.sd_k)
             self._go_on()
 
-    def _answer(
-        self, cut: _Cut, sd_k: float, sure: float = heat_question.SURE
-    ) -> tuple[Answer, Gain]:
+    def _answer(self, cut: _Cut, sd_k: float, sure: float = question.SURE) -> tuple[Answer, Gain]:
         """Return what the reading says so far, and the gain it shows."""
-        known, climbed = self._heater.gain, heat_climb.SHOWS * self._climb.shown
+        known, climbed = self._heater.gain, climb.SHOWS * self._climb.shown
         if known is not None:
-            return heat_question.of_known_rows(self._rows, cut.from_s, cut.at_s, known, sd_k, sure)
+            return question.of_known_rows(self._rows, cut.from_s, cut.at_s, known, sd_k, sure)
         weakest, froms_s = max(self._weakest, climbed), [cut.from_s]
         if not climbed:  # what has climbed may have failed since
             froms_s += [self._trial.since_s, -math.inf]
-        return heat_question.of_unknown_rows(self._rows, froms_s, cut.at_s, weakest, sd_k)
+        return question.of_unknown_rows(self._rows, froms_s, cut.at_s, weakest, sd_k)
 
     def _heated(self, known: Gain, now: Seen, sd_k: float, t_s: float) -> bool:
         """Return whether the reading has risen long after the power went, and latch that."""
@@ -276,17 +272,17 @@ class HeaterWatch:
         rate = self._rising(known, now, sd_k)
         heated = rate > RISES * known.mean
         if heated:
-            self._fail("heater.stuck_on", heat_question.told_of(rate), t_s)
+            self._fail("heater.stuck_on", question.told_of(rate), t_s)
         return heated
 
     def _rising(self, known: Gain, now: Seen, sd_k: float) -> float:
         """Return how fast the reading surely rises, in K/s, when nothing is under way any more."""
         from_s = now.t_s - max(OFF_LAGS * known.lag_s, BEFORE_S)
-        return heat_question.slope(self._rows, from_s, less_sd_k=sd_k)
+        return question.slope(self._rows, from_s, less_sd_k=sd_k)
 
     def _wild(self, known: Gain, from_s: float, gains: float) -> bool:
         """Return whether the reading fell faster than loss and so many `gains` together."""
-        fell = -heat_question.slope(self._rows, from_s)
+        fell = -question.slope(self._rows, from_s)
         return fell > max(self._doubt.loss(known), 0.0) + gains * known.mean
 
     def _accept(self, shown: Gain, asked_s: float) -> None:
@@ -311,13 +307,13 @@ class HeaterWatch:
         never seen comes to rest, anything may move its reading for a minute. One that an earlier
         run knew may be a weaker one by now, where a little is an answer.
         """
-        if self._heater.recalled and shown.mean > heat_question.SURE * shown.sd:
+        if self._heater.recalled and shown.mean > question.SURE * shown.sd:
             self._accept(shown, asked_s)
             return
         if self._heater.gain is None and self._t_s - self._failed_s >= LATELY_S:
             self._failed_s = self._t_s
             asked_c = [row.reading_c for row in self._rows if row.t_s >= cut.from_s]
-            self._refused_c = max(asked_c) + heat_trial.RISE_K  # one that falls bends like a lag
+            self._refused_c = max(asked_c) + trial.RISE_K  # one that falls bends like a lag
             self._trial.insist(self._t_s)
             self._go_on()
             return
@@ -343,7 +339,7 @@ class HeaterWatch:
         if known is not None:
             self._distrusted_k = 2.0 * known.stored_k
             from_s = self._t_s - max(known.lag_s, BEFORE_S)
-            self._doubt.distrust(known, -heat_question.slope(self._rows, from_s))
+            self._doubt.distrust(known, -question.slope(self._rows, from_s))
         self._go_on()
 
     def _go_on(self) -> None:

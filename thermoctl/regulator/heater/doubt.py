@@ -17,7 +17,7 @@ import math
 from typing import NamedTuple
 
 from thermoctl.quantities import clamp
-from thermoctl.regulator.heat_response import LAGS_S, Block, Gain, Heat
+from thermoctl.regulator.heater.response import LAGS_S, Block, Gain, Heat
 
 LEAST_K, SDS, LAGS = 0.3, 5.0, 1.0
 """A sum is a doubt beyond these: in K, in standard deviations of a reading, in rises of a lag."""

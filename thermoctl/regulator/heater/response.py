@@ -26,7 +26,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from thermoctl.regulator.heat_past import FirstReadings, Past
+from thermoctl.regulator.heater.past import FirstReadings, Past
 
 Heat = tuple[float, ...]
 """Heat that has arrived under each lag, in seconds of full power."""
