@@ -116,6 +116,18 @@ def test_a_heater_that_an_earlier_run_knew_is_not_asked_at_rest():
     assert held(told, 1500, 0.5).names() == []
 
 
+@pytest.mark.parametrize(("lag_s", "pulse_s"), [(20.0, 16), (30.0, 24)])
+def test_what_a_pulse_brings_is_not_expected_of_the_power_that_holds(lag_s, pulse_s):
+    known = Vessel(lag_s=lag_s).warm_up(900).watch.known
+    for seed in range(4):
+        vessel = Vessel(lag_s=lag_s, seed=seed)
+        vessel.first = vessel.second = 0.2
+        vessel.pass_by(60)
+        vessel.begin().watch.recall(known)
+        held(vessel, pulse_s, 1.0)
+        assert held(vessel, 900, 0.2).names() == [], seed
+
+
 @pytest.mark.parametrize("began_s", [90, 180, 270])
 @pytest.mark.parametrize("down_s", [0, 10])
 def test_a_restart_that_remembers_finds_no_fault_in_heat_from_before(began_s, down_s):

@@ -12,6 +12,10 @@ sensor that comes to the temperature of its water slows down from the first mome
 is under way when a heater dies. A climb that flattens slowly is followed: the plant comes near what
 it can reach.
 
+What made a climb is what was given during it, or what arrived of before, whichever is more: behind
+a lag the pulse that brings a plant back to its set point shows once the power is down to what holds
+it, and as much as that would be expected of the holding power ever after.
+
 It is remembered while there is less power, so that a plant which failed on its way to the set point
 is told as well, once as much power as before has been given for long and does nothing.
 """
@@ -31,7 +35,7 @@ from thermoctl.regulator.heater.doubt import (
     SURE_SHARE,
     Seen,
 )
-from thermoctl.regulator.heater.response import Block, Gain
+from thermoctl.regulator.heater.response import LAGS_S, Block, Gain
 
 STRETCH_S, STRETCH_K, STRETCH_SDS = 8.0, 0.1, 6.0
 """A stretch of a climb is no shorter, and no lower than both of these."""
@@ -115,7 +119,8 @@ class Climb:
         self._given_s += block.power * block.span_s
         span_s, rise_k = now.t_s - start.t_s, now.reading_c - start.reading_c
         if span_s >= STRETCH_S and rise_k > max(STRETCH_K, STRETCH_SDS * block.sd_k):
-            self._end_stretch(known, now, rise_k / span_s, self._given_s / span_s)
+            power = max(self._given_s / span_s, _arrived(known, start, now))
+            self._end_stretch(known, now, rise_k / span_s, power)
 
     def calm(self, sd_k: float) -> bool:
         """Return whether nothing is missing, so that gain and loss may be learnt."""
@@ -178,3 +183,10 @@ class Climb:
             self.shown = self._rate / power
         self._steep = rate
         self._from, self._given_s = now, 0.0
+
+
+def _arrived(known: Gain | None, start: Seen, now: Seen) -> float:
+    """Return the power that arrived from `start` to `now`; the most of any lag, of one unknown."""
+    places = range(len(LAGS_S)) if known is None else (known.place,)
+    heat_s = max(now.heat_s[place] - start.heat_s[place] for place in places)
+    return heat_s / (now.t_s - start.t_s)
