@@ -37,4 +37,4 @@ def clamp(value: float, low: float, high: float) -> float:
     """Return `value` limited to [low, high]; NaN becomes `low`, the safe end."""
     if not value >= low:  # written so that NaN fails too
         return low
-    return min(value, high)
+    return high if value > high else value  # a call of `min` would take as long as all the rest

@@ -7,7 +7,6 @@ is ever counted down, and none can drift, however long a loop runs.
 from __future__ import annotations
 
 import math
-from operator import add
 from typing import NamedTuple
 
 from thermoctl.signals import ShadowScore
@@ -66,32 +65,29 @@ class Tally(NamedTuple):
         """Return the tally after one more sample; None for one that does not count."""
         if played is None:
             return self if self.before is None else Tally(self.rows, self.current, None, self.score)
-        sums = _added(self.current, _of(played, self.before))
+        sums = _with(self.current, played, self.before)
         if sums.span_s < ROW_S:
             return Tally(self.rows, sums, played, self.score)
         rows = (*self.rows, sums)[-ROWS:]
         return Tally(rows, NONE, played, _score(rows))
 
 
-def _of(played: Round, before: Round | None) -> Sums:
-    """Return what one sample adds."""
-    last = played if before is None else before
-    e, shadow_e = played.surprise_k, played.shadow_surprise_k
+def _with(sums: Sums, played: Round, before: Round | None) -> Sums:
+    """Return `sums` with one sample more; by unpacking, since looking up names takes longer."""
+    span_s, apart_s, travel, shadow_travel, squares, samples, shadow_squares, shadow_samples = sums
+    seen_s, given, shadow, e, shadow_e = played
+    _, given_before, shadow_before, _, _ = played if before is None else before
     known, shadow_known = math.isfinite(e), math.isfinite(shadow_e)
     return Sums(
-        played.seen_s,
-        abs(played.given - played.shadow) * played.seen_s,
-        abs(played.given - last.given),
-        abs(played.shadow - last.shadow),
-        e * e if known else 0.0,
-        float(known),
-        shadow_e * shadow_e if shadow_known else 0.0,
-        float(shadow_known),
+        span_s + seen_s,
+        apart_s + abs(given - shadow) * seen_s,
+        travel + abs(given - given_before),
+        shadow_travel + abs(shadow - shadow_before),
+        squares + (e * e if known else 0.0),
+        samples + known,
+        shadow_squares + (shadow_e * shadow_e if shadow_known else 0.0),
+        shadow_samples + shadow_known,
     )
-
-
-def _added(one: Sums, other: Sums) -> Sums:
-    return Sums(*map(add, one, other))
 
 
 def _score(rows: tuple[Sums, ...]) -> ShadowScore:
