@@ -10,11 +10,12 @@ from thermoctl.quantities import Array
 from thermoctl.regulator.guard import Guard
 from thermoctl.regulator.holding import Holding
 from thermoctl.regulator.reference import Reference
+from thermoctl.regulator.steering import Pole
 from thermoctl.regulator.supervisor import Supervisor
-from thermoctl.signals import Beliefs, Estimate
+from thermoctl.signals import Estimate
 
 _FAILED = "estimator.failed"
-_SILENT = Beliefs()
+_NO_POLE: Pole = None, None
 
 _Learnt = tuple[IdentifierBelief, IdentifierBelief | None, bool]
 """The belief after a sample, what is foreseen without one, and whether all of it is finite."""
@@ -97,14 +98,18 @@ class Learning:
             reference.target_c,
         )
 
-    def beliefs(self, t_s: float) -> Beliefs:
-        """Return what is known beside any controller: the pole, and the holding power."""
-        return self._guard.call(_FAILED, t_s, _SILENT, self._words)
+    def pole(self, t_s: float) -> Pole:
+        """Return the pole that is learnt and its sd, as far as the structure has one."""
+        return self._guard.call(_FAILED, t_s, _NO_POLE, self._pole)
 
-    def _words(self) -> Beliefs:
+    def _pole(self) -> Pole:
         estimate = self._belief.estimate
-        a, a_sd = self._identifier.structure.pole(estimate.theta, estimate.P)
-        return Beliefs(None, None, a, a_sd, self._holding.known)
+        return self._identifier.structure.pole(estimate.theta, estimate.P)
+
+    @property
+    def holding_power(self) -> float | None:
+        """The power that has been holding the plant, None while it is not known."""
+        return self._holding.known
 
 
 def _all_finite(values: Array) -> bool:

@@ -209,7 +209,8 @@ class Regulator:
         situation = self._learning.situation(t_s, interval_s, temperature_c, reference, applied)
         self._steering.observe(situation)
         self._shadow.observe(situation, self._steering.mind)
-        beliefs = self._steering.beliefs(situation, self._learning.beliefs(t_s))
+        pole, holding_power = self._learning.pole(t_s), self._learning.holding_power
+        beliefs = self._steering.beliefs(situation, pole, holding_power)
         self._jump_k = self._jump_for(beliefs)
         weighed = attempt(self._weigh, interval_s, applied, temperature_c, beliefs.lag_s)
         if isinstance(weighed, Failure):

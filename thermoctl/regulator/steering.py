@@ -17,6 +17,9 @@ from thermoctl.signals import Beliefs, PlantBelief
 _FAILED = "controller.failed"
 _SILENT = Beliefs()
 
+Pole = tuple[float | None, float | None]
+"""A pole and its standard deviation; None for what is not known."""
+
 
 class Steering:
     """Asks the controller in charge; when it fails, that costs the heat.
@@ -51,17 +54,17 @@ class Steering:
         nothing: object = 0.0
         return self._guard.call(_FAILED, situation.t_s, nothing, self.mind.decide, situation)
 
-    def beliefs(self, situation: Situation, otherwise: Beliefs) -> Beliefs:
-        """Return the controller's words, those of `otherwise` where it says nothing."""
+    def beliefs(self, situation: Situation, pole: Pole, holding_power: float | None) -> Beliefs:
+        """Return the controller's words; where it says nothing, what is known beside it."""
         t_s = situation.t_s
-        return self._guard.call(_FAILED, t_s, _SILENT, self._words, situation, otherwise)
+        return self._guard.call(_FAILED, t_s, _SILENT, self._words, situation, pole, holding_power)
 
-    def _words(self, situation: Situation, otherwise: Beliefs) -> Beliefs:
+    def _words(self, situation: Situation, pole: Pole, holding_power: float | None) -> Beliefs:
         told = self.mind.controller.beliefs(self.mind.belief, situation)
-        pole = otherwise if told.a is None else told
-        holding = otherwise if told.holding_power is None else told
-        power = holding.holding_power
-        return Beliefs(told.gain, told.gain_sd, pole.a, pole.a_sd, power, told.lag_s)
+        a, a_sd = pole if told.a is None else (told.a, told.a_sd)
+        if told.holding_power is not None:
+            holding_power = told.holding_power
+        return Beliefs(told.gain, told.gain_sd, a, a_sd, holding_power, told.lag_s)
 
     @property
     def tell(self) -> Callable[[], PlantBelief | None]:
