@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
+from thermoctl.filling import quickly_filled
 from thermoctl.quantities import Array
 from thermoctl.signals import Beliefs, Estimate, PlantBelief, RawSample
 
@@ -133,6 +134,7 @@ class Estimator(Protocol):
         ...
 
 
+@quickly_filled
 @dataclass(frozen=True, slots=True, eq=False)
 class Situation:
     """What a controller may know when it is asked for a power.

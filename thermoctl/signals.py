@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from thermoctl.filling import quickly_filled
 from thermoctl.quantities import Array
 from thermoctl.requests import Acknowledge as Acknowledge
 from thermoctl.requests import ChooseController as ChooseController
@@ -105,6 +106,7 @@ class Estimate:
     rejected: bool = False
 
 
+@quickly_filled
 @dataclass(frozen=True, slots=True)
 class Beliefs:
     """An estimate in the operator's words; None where the model in use says nothing.
@@ -280,6 +282,7 @@ def _no_models() -> Mapping[str, Mapping[str, Any]]:
     return {}
 
 
+@quickly_filled
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
     """Everything the regulator made of one measurement.
@@ -302,13 +305,13 @@ class Step:
     command: Command
     controller: str
     estimate: Estimate
-    beliefs: Beliefs = field(default_factory=Beliefs)
+    beliefs: Beliefs = Beliefs()
     alarms: tuple[Alarm, ...] = ()
     events: tuple[Event, ...] = ()
     shadow: str | None = None
     shadow_power: float | None = None
     shadow_score: ShadowScore | None = None
-    feasible: Feasible = field(default_factory=Feasible)
+    feasible: Feasible = Feasible()
     reference_c: float = math.nan
     load: float = 0.0
     tell: Callable[[], PlantBelief | None] = field(default=_nothing, repr=False)
