@@ -29,7 +29,7 @@ from thermoctl.model import sensor as curves
 from thermoctl.model.arx import Arx, KnownGain
 from thermoctl.ports import Controller, Estimator
 from thermoctl.regulator import Limits, Plan
-from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.check import HeaterCheck, weakest_of
 
 HEAT, COOL, HEAT_COOL = "heat", "cool", "heat-cool"
 
@@ -197,7 +197,10 @@ def _heater_check(table: LoopTable, controller: Controller) -> HeaterCheck | Non
     if not check.enabled or table.cooler is not None or not drives:
         return None
     cools = action_of(controller) == COOL
-    return HeaterCheck(check.weakest_k_per_s, check.first_heat_s, "cool" if cools else "heat")
+    weakest = check.weakest_k_per_s
+    if weakest is None:
+        weakest = weakest_of(table.heater_w)
+    return HeaterCheck(weakest, check.first_heat_s, "cool" if cools else "heat")
 
 
 def _limits(table: LoopTable, controller: Controller) -> Limits:

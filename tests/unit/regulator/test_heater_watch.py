@@ -10,7 +10,7 @@ from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
 from thermoctl.errors import ConfigError
 from thermoctl.regulator.heater.blocks import Blocks, Repeats
-from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.check import HeaterCheck, weakest_of
 from thermoctl.regulator.heater.doubt import Seen
 from thermoctl.regulator.heater.question import Answer, contrast, of_known, of_unknown
 from thermoctl.regulator.heater.response import Block, Gain, HeatResponse
@@ -167,6 +167,58 @@ def test_the_weakest_heater_is_not_condemned_for_the_noise_of_a_burst(lag_s):
     for seed in (8, 28, 29):
         plant = Plant(gain=6e-5, loss=0.0, lag_s=lag_s, seed=seed, noise_k=0.012).run(5400, 1.0)
         assert set(plant.names()) <= {"heater.questioned", "heater.answered"}, seed
+
+
+def in_air(plant, seed):
+    """Return `plant` with its sensor in air that wanders by .05 K, within three minutes or so."""
+    rng, off_k = np.random.default_rng(seed), deque([0.0], maxlen=1)
+
+    def shows(_):
+        off_k.append(0.995 * off_k[0] + 0.005 * rng.standard_normal())
+        return 22.0 + off_k[0]
+
+    plant.shows = shows
+    return plant
+
+
+@pytest.mark.slow
+def test_air_that_wanders_seldom_answers_for_a_heater_whose_sensor_hangs_in_it():
+    plants = [in_air(Plant(weakest_k_per_s=9e-4, seed=seed), seed) for seed in range(8)]
+    given_s = [sum(plant.run(1, 1.0).applied for _ in range(3600)) for plant in plants]
+    assert sorted(given_s)[6] < 400.0
+    assert [plant.watch.known for plant in plants].count(None) >= 7
+
+
+def test_a_gain_below_that_of_the_weakest_plant_is_no_answer():
+    t_s = np.arange(60) * 4.0
+    heat_s = np.minimum(t_s, 120.0)
+    rows = [
+        Seen(float(t), 25.0 + 1e-3 * float(heat), (float(heat),) * 6)
+        for t, heat in zip(t_s, heat_s, strict=True)
+    ]
+    found = contrast(rows, 1e-4)
+    assert of_unknown(found, 5e-4, 0.0)[0] is Answer.HEATS
+    assert of_unknown(found, 2e-3, 0.0)[0] is Answer.NOTHING
+
+
+def test_a_rated_heater_is_no_weaker_than_in_the_largest_vessel():
+    assert weakest_of(None) == weakest_of(1.0) == weakest_of(50.0) == 6e-5
+    assert weakest_of(4186.0) == pytest.approx(1.0 / 400.0)
+    for heater_w in (200.0, 4000.0):
+        assert weakest_of(heater_w) < heater_w / (4186.0 * 200.0)
+    assert HeaterCheck(weakest_of(1e9)).weakest_k_per_s == 0.5
+
+
+@pytest.mark.parametrize(
+    ("said", "weakest"),
+    [({}, 6e-5), ({"heater_w": 2093.0}, 1.25e-3), ({"heater_w": 2093.0, "check": 0.01}, 0.01)],
+)
+def test_the_check_goes_by_the_rated_power_unless_it_is_told_better(said, weakest):
+    check = {"weakest_k_per_s": said["check"]} if "check" in said else {}
+    rated = {"heater_w": said["heater_w"]} if "heater_w" in said else {}
+    table = {"setpoint_c": 37.5, "trip_above_c": 60.0, "heater_check": check} | rated
+    plan = plan_for(load({"loops": {"tank": table}}).loops["tank"])
+    assert plan.heater_check.weakest_k_per_s == pytest.approx(weakest)
 
 
 def test_a_litre_of_cold_water_is_no_fault():

@@ -201,10 +201,11 @@ class HeaterCheckTable(Table):
     enabled: bool = Field(
         True, description="Compare them, and ask a heater in doubt by cutting its power."
     )
-    weakest_k_per_s: Annotated[float, Field(ge=1e-6, le=0.5)] = Field(
-        6e-5,
-        description="Least rise at full power, in K/s, that a healthy plant can have; 50 W in 200 "
-        "l have 6e-5. The more is said here, the less a heater that was never seen to heat may "
+    weakest_k_per_s: Annotated[float, Field(ge=1e-6, le=0.5)] | None = Field(
+        None,
+        description="Least rise at full power, in K/s, that a healthy plant can have; left out, "
+        "what `heater_w` does to 400 l of water, and without that 6e-5, which is 50 W in 200 l. "
+        "The more is said here, the less a heater that was never seen to heat may "
         "give before it is called a fault.",
     )
     first_heat_s: Annotated[float, Field(ge=10.0, le=3600.0)] = Field(
@@ -261,7 +262,9 @@ class LoopTable(Table):
         None, description="Most the power may move away from 0 in a second."
     )
     heater_w: Positive | None = Field(
-        None, description="Rated power of the heater in W; with it, watts and litres are told."
+        None,
+        description="Rated power of the heater in W; with it, watts and litres are told, and a "
+        "heater that was never seen to heat is checked by what so much does at least.",
     )
     jump_k: Positive = Field(
         1.0,

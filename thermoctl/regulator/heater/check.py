@@ -5,7 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from thermoctl.quantities import clamp
 from thermoctl.ranges import check_ranges, ranged
+
+WEAKEST_K_PER_S = 6e-5
+"""What 50 W do to 200 l in a second."""
+LARGEST_J_PER_K = 400.0 * 4186.0
+"""No vessel takes more than that to warm by a kelvin: twice 200 l of water, for what else there is
+to be warmed and for what is lost meanwhile."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +22,7 @@ class HeaterCheck:
     Parameters
     ----------
     weakest_k_per_s : float
-        Least rise at full power that a healthy plant can have, in K/s; 6e-5 is 50 W in 200 l.
+        Least rise at full power that a healthy plant can have, in K/s.
     first_heat_s : float
         Seconds of full power an unknown heater has to show that it heats, before it is asked. Less
         power has longer, by its cube: it does less harm, and a plant that is only held at its set
@@ -29,7 +36,7 @@ class HeaterCheck:
         An argument is outside its range.
     """
 
-    weakest_k_per_s: float = ranged(6e-5, 1e-6, 0.5)
+    weakest_k_per_s: float = ranged(WEAKEST_K_PER_S, 1e-6, 0.5)
     first_heat_s: float = ranged(60.0, 10.0, 3600.0)
     action: Literal["heat", "cool"] = "heat"
 
@@ -37,3 +44,13 @@ class HeaterCheck:
         check_ranges(self)
         if self.action not in ("heat", "cool"):
             raise ValueError(f"action must be 'heat' or 'cool', got {self.action!r}")
+
+
+def weakest_of(heater_w: float | None) -> float:
+    """Return the least rise in K/s at full power that a heater of so many W makes.
+
+    Heat goes somewhere: what is rated at 4 kW warms no vessel as slowly as 50 W may. Unknown, it
+    may be that weak.
+    """
+    rate = 0.0 if heater_w is None else heater_w / LARGEST_J_PER_K
+    return clamp(rate, WEAKEST_K_PER_S, 0.5)

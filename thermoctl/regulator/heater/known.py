@@ -80,7 +80,7 @@ class KnownHeater:
             return
         if self.recalled and now.t_s < RECALLED_S:
             return
-        if now.heat_s[gain.place] > max(ARRIVED_LAGS * gain.lag_s, ARRIVED_S):
+        if arrived(gain, now):
             self.gain, self.recalled = gain, False
 
     def accept(self, shown: Gain) -> None:
@@ -124,3 +124,8 @@ class KnownHeater:
     def under_way_s(self) -> float:
         """How long after the power heat of before may still arrive."""
         return OFF_LAGS * (self.longer_s if self._obeys else LAGS_S[-1])
+
+
+def arrived(gain: Gain, now: Seen) -> bool:
+    """Return whether enough heat has come by `now` to know a gain under such a lag."""
+    return now.heat_s[gain.place] > max(ARRIVED_LAGS * gain.lag_s, ARRIVED_S)

@@ -28,6 +28,10 @@ SURE = 4.0
 """A gain differs from nothing at so many standard deviations."""
 ANSWERS, NOTHING = 0.35, 0.3
 """Of the known gain: so much is an answer, of whatever sign, and less than that is none."""
+WANDERS = 0.5
+"""What is left over and resembles its neighbours is as good as few readings, and its error is known
+from those: an unknown heater has to answer by so much more where they are all alike. At the same
+four deviations the air around a sensor that hangs beside its tank answered for it."""
 RULED_OUT = 2.0
 """A gain is ruled out so many standard deviations away: it is looked at a hundred times, and once
 is enough. At 1.6 three of 20 heaters were condemned that were as weak as any may be."""
@@ -58,11 +62,12 @@ class Answer(Enum):
 
 
 class Contrast(NamedTuple):
-    """Gain in K/s for each lag, its sd, and the variance that is left over."""
+    """Gain in K/s for each lag, its sd, what is left over, how alike neighbours are."""
 
     mean: Array
     sd: Array
     left: Array
+    alike: Array
 
     def best(self, places: Iterable[int]) -> Gain:
         """Return the gain under that lag of `places` which leaves the least over."""
@@ -88,7 +93,7 @@ def contrast(rows: Sequence[Seen], sd_k: float) -> Contrast | None:
     alike = np.clip((rest[1:] * rest[:-1]).sum(axis=0) / squares, 0.0, WORTH_MOST)
     left = squares / max(n - 4, 1)
     variance = np.maximum(left * (1.0 + alike) / (1.0 - alike), sd_k * sd_k)
-    return Contrast(mean, CAUTION * np.sqrt(variance / heats), left)
+    return Contrast(mean, CAUTION * np.sqrt(variance / heats), left, alike)
 
 
 def of_known(found: Contrast, known: Gain, sure: float = SURE) -> tuple[Answer, Gain]:
@@ -120,7 +125,9 @@ def of_unknown(found: Contrast, weakest: float, slope: float) -> tuple[Answer, G
     """
     shown = found.best(range(len(LAGS_S)))
     useless = USELESS * abs(slope)
-    if shown.mean > SURE * shown.sd:
+    sure = SURE * (1.0 + WANDERS * float(found.alike[shown.place]))
+    too_weak = shown.mean + RULED_OUT * shown.sd < weakest
+    if shown.mean > sure * shown.sd and not too_weak:
         return Answer.HEATS, shown
     if shown.mean < -max(SURE * shown.sd, useless):
         return Answer.COOLS, shown

@@ -17,7 +17,7 @@ from thermoctl.regulator.heater.blocks import Blocks, Repeats
 from thermoctl.regulator.heater.check import HeaterCheck
 from thermoctl.regulator.heater.climb import Climb
 from thermoctl.regulator.heater.doubt import HeatDoubt, Seen
-from thermoctl.regulator.heater.known import OFF_LAGS, KnownHeater
+from thermoctl.regulator.heater.known import OFF_LAGS, KnownHeater, arrived
 from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S, Answer
 from thermoctl.regulator.heater.response import Block, Gain, HeatResponse
 from thermoctl.regulator.heater.trial import Trial
@@ -227,6 +227,8 @@ class HeaterWatch:
         if known is not None and self._heated(known, now, block.sd_k, t_s):
             return
         answer, shown = self._answer(cut, block.sd_k)
+        if known is None and answer is Answer.HEATS and not arrived(shown, now):
+            answer = Answer.OPEN  # what wanders in the air is as long as the longest lags
         heard_s = HEARD_S if known is None else HEARD_LAGS * lag_s
         bad_s = BAD_S if known is None else BAD_LAGS * lag_s
         if answer is Answer.HEATS:
