@@ -254,15 +254,19 @@ class Feasibility:
 
         It leaves the set point behind, or does not come back to it: something else heats what
         should be heated, the air or an output that is stuck at too little for `heater.stuck_on`.
+        The first needs no gain: what has been stuck on since before a start is all that this run
+        has seen of its heater.
         """
         sign = -1.0 if wanted.power_cools else 1.0
         here_c, gain = sign * belief.x[heat_loss.T], sign * belief.gain
         self._alone.seen(here_c)
         beyond = here_c - sign * wanted.setpoint_c >= BEYOND_K
-        if not (none and beyond and belief.gain_known and gain > 0.0):
+        if not (none and beyond) or (belief.gain_known and gain < 0.0):
             self._alone.clear()
             return 0.0
         away = heat_loss.spare(belief, sign * here_c, 0.0, belief.ahead_k)
+        if not belief.gain_known:
+            return sign * away.mean / away.sd if self._alone.wait(self._before.span_s) else 0.0
         plant = Beyond(here_c, gain, -sign * away.mean)
         missing = self._alone.missing(plant, self._before.span_s, math.sqrt(belief.R))
         return max(sign * away.mean / away.sd, SURE_SDS * missing)

@@ -59,6 +59,14 @@ class LeftAlone:
         """Take in where the plant is; as low as it was once it may be at rest."""
         self._lowest_c = min(self._lowest_c, reading_c)
 
+    def wait(self, span_s: float) -> bool:
+        """Return whether all heat has come after another `span_s` without power.
+
+        That of before a start as well, of which nobody else knows.
+        """
+        self._alone_s += span_s
+        return self._alone_s > WAITS_S
+
     def missing(self, beyond: Beyond, span_s: float, sd_k: float) -> float:
         """Return how much is missing after another `span_s` without power; 1 is a doubt.
 
@@ -75,10 +83,9 @@ class LeftAlone:
         if math.isnan(self._from_c):
             least = beyond.gain * (reading_c - self._lowest_c) / WARMS_AT_MOST_K
             self._from_c, self._loss = reading_c, max(beyond.loss, least)
-        self._alone_s += span_s
         self._before_c = reading_c
         limit_k = max(LEFT_K, LEFT_SDS * sd_k)
-        if self._alone_s > WAITS_S and self._loss > 0.0:
+        if self.wait(span_s) and self._loss > 0.0:
             rise_k = min(reading_c - before_c, beyond.gain * span_s)  # hot water is no fault
             missing_k = self._missing_k + rise_k + LOSES * self._loss_at(reading_c) * span_s
             self._missing_k = clamp(missing_k, 0.0, MOST * limit_k)

@@ -163,6 +163,22 @@ def test_a_small_plant_that_stands_far_above_its_set_point_without_power_is_told
     assert codes(step) == [DRIVEN]
 
 
+@pytest.mark.parametrize("stuck", [0.3, 1.0])
+def test_an_output_stuck_on_since_before_a_start_that_knows_nothing_is_told(stuck):
+    tank = Tank(8.0, 1500.0, 12.0, water_c=40.0, setpoint_c=40.0, trip_above_c=200.0)
+    tank.element = tank.shorted = stuck
+    assert codes(tank.run(220)) == []  # heat of before may be on its way for so long
+    step = tank.run(200)
+    assert step.command.power == 0.0
+    assert codes(step) == [DRIVEN]
+
+
+def test_water_of_which_nothing_is_known_cools_down_without_a_word():
+    tank = Tank(8.0, 1500.0, 12.0, water_c=60.0, setpoint_c=40.0)
+    for _ in range(20):
+        assert codes(tank.run(300)) == []
+
+
 def test_water_that_cools_down_to_its_set_point_or_rests_above_it_is_not_driven():
     tank = Tank(2.0, 300.0, 4.0, setpoint_c=40.0)
     tank.run(900)
