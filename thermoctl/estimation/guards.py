@@ -17,7 +17,8 @@ from thermoctl.estimation.belief import LARGEST, frozen, positive, scalar, truth
 from thermoctl.estimation.kalman import CorrectedKalman, RandomWalkKalman
 from thermoctl.estimation.least_squares import RecursiveLeastSquares
 from thermoctl.estimation.recursion import RecursiveLaw, regressor
-from thermoctl.estimation.stack import Stacked, stack, unstacked
+from thermoctl.estimation.stack import Stacked, stack
+from thermoctl.filling import quickly_filled
 from thermoctl.quantities import Array, clamp
 from thermoctl.signals import Estimate
 
@@ -49,6 +50,7 @@ class _Memory(NamedTuple):
     ranked: Sequence[float] = ()
 
 
+@quickly_filled
 @dataclass(frozen=True, slots=True, eq=False)
 class GuardedEstimate(Stacked):
     """An estimate with what its guards remember.
@@ -133,22 +135,21 @@ class Guarded:
         """
         phi, y = regressor(phi), scalar("y", y)
         before = belief if isinstance(belief, GuardedEstimate) else _adopted(belief)
-        law, rows = self._law(before._memory), stack(before)
-        learned = law.learn(rows, phi, y)
+        law, known = self._law(before._memory), stack(before)
+        learned = law.learn(known, phi, y)
         if learned is None:
             return replace(before, rejected=True)
-        memory = self._remembered(before._memory, rows, phi, y)
+        memory = self._remembered(before._memory, known, phi, y)
         excitation = math.sqrt(memory.spread_squared)
         R2 = getattr(law, "R2", math.nan)
         rows, e, S, inflation = learned
-        if self.excitation_min is not None and excitation < self.excitation_min:
-            theta, P = before.theta, before.P
-            return GuardedEstimate(theta, P, e, S, 1.0, True, excitation, R2, memory)
-        after = unstacked(GuardedEstimate, self._bounded(rows), e, S, inflation)
-        _set_excitation(after, excitation)
-        _set_R2(after, R2)
-        _set_memory(after, memory)
-        return after
+        paused = self.excitation_min is not None and excitation < self.excitation_min
+        if paused:
+            theta, P, stacked, inflation = before.theta, before.P, before.rows, 1.0
+        else:
+            stacked = self._bounded(rows)
+            theta, P = stacked[0], stacked[1:]
+        return GuardedEstimate(theta, P, e, S, inflation, paused, stacked, excitation, R2, memory)
 
     def _bounded(self, rows: Array) -> Array:
         """Return `rows` with no variance above `covariance_max` and the correlations kept."""
@@ -229,9 +230,3 @@ def _renewed(
         insort(ranked, newest)
         residuals = (newest, *residuals)
     return residuals, ranked
-
-
-# As in `thermoctl.estimation.stack`: quicker than through the frozen dataclass.
-_set_excitation = vars(GuardedEstimate)["excitation"].__set__
-_set_R2 = vars(GuardedEstimate)["R2"].__set__  # noqa: N816 - R2 keeps its letter
-_set_memory = vars(GuardedEstimate)["_memory"].__set__

@@ -36,7 +36,7 @@ from thermoctl.estimation.belief import (
     scalar,
     shown,
 )
-from thermoctl.estimation.stack import Learned, Stacked, stack, unstacked
+from thermoctl.estimation.stack import Learned, stack, unstacked
 from thermoctl.quantities import Array, is_finite_number
 from thermoctl.signals import Estimate
 
@@ -105,7 +105,7 @@ class RecursiveLaw(ABC):
         if not isinstance(belief, Estimate):
             raise TypeError(f"belief must be an Estimate, got {type(belief).__name__}")
         learned = self.learn(stack(belief), phi, scalar("y", y))
-        return rejected(belief) if learned is None else unstacked(Stacked, *learned)
+        return rejected(belief) if learned is None else unstacked(learned)
 
     def learn(self, rows: Array, phi: Array, y: float) -> Learned | None:
         """Return what the stack `rows` becomes; None for a sample that cannot be used.

@@ -92,3 +92,11 @@ def test_the_stack_of_a_guarded_estimate_holds_the_covariance_that_was_capped(n)
     assert belief.P.diagonal() == pytest.approx(np.full(n, 0.5))
     assert stack(belief).tolist() == [belief.theta.tolist(), *belief.P.tolist()]
     assert not belief.rows.flags.writeable
+
+
+@pytest.mark.parametrize("law", [LAW, Guarded(LAW, covariance_max=0.1)])
+def test_what_was_learnt_goes_into_the_next_update_without_a_copy(law):
+    rng, belief = np.random.default_rng(4), law.update(start(2), PHI, Y)
+    for _ in range(3):
+        assert stack(belief) is belief.rows
+        belief = law.update(belief, rng.normal(size=2), Y)
