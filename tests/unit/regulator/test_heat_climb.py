@@ -143,11 +143,12 @@ def test_a_first_warm_up_to_what_a_plant_can_reach_is_no_fault(seed):
     assert plant.names().count("heater.questioned") <= 1
 
 
-def climbing(readings_c, power=1.0, known=None):
-    """Return what is thought of readings 4 s apart under `power`."""
+def climbing(readings_c, powers=None, known=None):
+    """Return what is thought of readings 4 s apart under `powers`, full when none are given."""
+    powers = [1.0] * len(readings_c) if powers is None else powers
     climb, before = Climb(), Seen(0.0, readings_c[0], HEAT)
     for n, reading_c in enumerate(readings_c[1:], 1):
-        now, block = Seen(4.0 * n, reading_c, HEAT), Block(4.0, power, reading_c, 0.01)
+        now, block = Seen(4.0 * n, reading_c, HEAT), Block(4.0, powers[n], reading_c, 0.01)
         climb.observe(known, block, before, now, jumped=False)
         before = now
     return climb
@@ -164,6 +165,15 @@ def test_as_much_power_has_to_raise_the_reading_as_before_whatever_the_gain():
 def test_a_climb_that_is_weak_beside_the_gain_is_none():
     rise = np.concatenate((np.arange(20) * 0.2, np.full(20, 3.8)))
     assert not climbing(rise, known=Gain(0.5, 0.01, 2)).stalled(0.01)
+
+
+def test_of_a_climb_that_is_forgotten_nothing_is_expected():
+    known, sd_k = Gain(0.05, 0.001, 2, 0.005), 0.01
+    rise, stand = np.arange(20) * 0.2, np.full(500, 3.8)
+    fall = 3.8 - 0.02 * np.arange(400)
+    climb = climbing(np.concatenate((rise, stand, fall)), [1.0] * 20 + [0.0] * 900, known)
+    assert not climb.stalled(sd_k)
+    assert climb.calm(sd_k)
 
 
 def test_a_climb_that_goes_on_after_a_dip_is_asked_about_no_more():

@@ -110,7 +110,7 @@ class Climb:
                 self._wait_s = max(AGAIN_S, AGAIN_LAGS * known.lag_s)
         elif self._wait_s > 0.0:
             self._wait_s -= block.span_s
-        elif not jumped:
+        elif not jumped and self._rate > 0.0:  # of a climb that is forgotten nothing is expected
             self._compare(known, block, before, now)
         start = self._from
         if start is None or jumped or now.reading_c < start.reading_c or block.power <= 0.0:
