@@ -31,6 +31,8 @@ FAULTS = {
     "sensor out": (lambda power: power, {"heater.no_response"}),
 }
 
+TOLD = {"heater.stuck_on", "plant.driven"}
+
 
 class Lab:
     """A board under a controller; a second is a cycle."""
@@ -135,3 +137,20 @@ def test_a_reading_that_stands_still_below_the_set_point_of_a_lab_is_latched(con
             assert after_s < 400, seed
         print(f"{controller}, lab {seed}: latched after {after_s} s, {top_c - began_c:+.1f} K")
         assert top_c - began_c < 25.0
+
+
+@pytest.mark.parametrize("controller", ["adaptive", "pid"])
+@pytest.mark.slow
+def test_an_output_of_a_lab_that_sticks_above_what_holds_gets_no_power_and_is_told(controller):
+    for seed in range(3):
+        lab = Lab(controller, seed)
+        lab.live(1200)
+        held = np.mean([told.command.power for told in lab.steps[-200:]])
+        lab.does, began = lambda _, share=held + 0.15: share, len(lab.steps)
+        lab.live(500)
+        after = lab.steps[began:]
+        told_s = next(n for n, told in enumerate(after) if TOLD & {a.code for a in told.alarms})
+        above_k = lab.heat.first_c - 50.0
+        print(f"stuck above what holds, {controller}, lab {seed}: {told_s} s, {above_k:+.1f} K")
+        assert told_s < 480
+        assert max(told.command.power for told in after[60:]) < 0.05

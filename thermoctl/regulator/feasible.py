@@ -261,15 +261,16 @@ class Feasibility:
         here_c, gain = sign * belief.x[heat_loss.T], sign * belief.gain
         self._alone.seen(here_c)
         beyond = here_c - sign * wanted.setpoint_c >= BEYOND_K
-        if not (none and beyond) or (belief.gain_known and gain < 0.0):
+        known = belief.gain_known
+        reversed_ = known and gain < 0.0 and not self._alone.knows
+        if not (none and beyond) or reversed_:
             self._alone.clear()
             return 0.0
         away = heat_loss.spare(belief, sign * here_c, 0.0, belief.ahead_k)
-        if not belief.gain_known:
-            return sign * away.mean / away.sd if self._alone.wait(self._before.span_s) else 0.0
-        plant = Beyond(here_c, gain, -sign * away.mean)
+        plant = Beyond(here_c, gain, -sign * away.mean) if known else Beyond(here_c, 0.0, 0.0)
         missing = self._alone.missing(plant, self._before.span_s, math.sqrt(belief.R))
-        return max(sign * away.mean / away.sd, SURE_SDS * missing)
+        leaves = known or self._alone.waited
+        return max(sign * away.mean / away.sd if leaves else 0.0, SURE_SDS * missing)
 
     def _tell(self, belief: HeatBelief, wanted: Wanted, t_s: float) -> None:
         """Raise the alarms, or clear them."""

@@ -1,9 +1,10 @@
 """Whether a plant that gets no power comes back from beyond its set point.
 
 A balance of heat learns whatever goes on for long: an output that is stuck on becomes a plant that
-loses nothing, and one that stands far beyond its set point is then in order. What it lost before
-the power went is not learnt from what came after it. A plant that is left alone loses a good part
-of that, as long as it is not colder; one that does not is heated by something else.
+loses nothing and that no power moves, and one that stands far beyond its set point is then in
+order. What it lost before the power went, and what power did, is not learnt from what came after. A
+plant that is left alone loses a good part of that, as long as it is not colder; one that does not
+is heated by something else.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ class Beyond(NamedTuple):
     reading_c : float
         Where it is.
     gain, loss : float
-        Rate at full power and the opposite one without, in K/s, as they are believed now.
+        Rate at full power and the opposite one without, in K/s, as they are believed now; 0 where
+        they are not known. What counts are those of the moment when the power went.
     """
 
     reading_c: float
@@ -52,20 +54,22 @@ class LeftAlone:
 
     def clear(self) -> None:
         """Begin anew when there is no power the next time."""
-        self._alone_s = self._missing_k = self._loss = 0.0
+        self._alone_s = self._missing_k = self._loss = self._gain = 0.0
         self._from_c = self._before_c = math.nan
 
     def seen(self, reading_c: float) -> None:
         """Take in where the plant is; as low as it was once it may be at rest."""
         self._lowest_c = min(self._lowest_c, reading_c)
 
-    def wait(self, span_s: float) -> bool:
-        """Return whether all heat has come after another `span_s` without power.
-
-        That of before a start as well, of which nobody else knows.
-        """
-        self._alone_s += span_s
+    @property
+    def waited(self) -> bool:
+        """Whether all heat has come, that of before a start as well."""
         return self._alone_s > WAITS_S
+
+    @property
+    def knows(self) -> bool:
+        """Whether the gain was known when the power went, and drives the right way."""
+        return self._gain > 0.0
 
     def missing(self, beyond: Beyond, span_s: float, sd_k: float) -> float:
         """Return how much is missing after another `span_s` without power; 1 is a doubt.
@@ -83,10 +87,12 @@ class LeftAlone:
         if math.isnan(self._from_c):
             least = beyond.gain * (reading_c - self._lowest_c) / WARMS_AT_MOST_K
             self._from_c, self._loss = reading_c, max(beyond.loss, least)
+            self._gain = beyond.gain
+        self._alone_s += span_s
         self._before_c = reading_c
         limit_k = max(LEFT_K, LEFT_SDS * sd_k)
-        if self.wait(span_s) and self._loss > 0.0:
-            rise_k = min(reading_c - before_c, beyond.gain * span_s)  # hot water is no fault
+        if self.waited and self._loss > 0.0:
+            rise_k = min(reading_c - before_c, self._gain * span_s)  # hot water is no fault
             missing_k = self._missing_k + rise_k + LOSES * self._loss_at(reading_c) * span_s
             self._missing_k = clamp(missing_k, 0.0, MOST * limit_k)
         return self._missing_k / limit_k
