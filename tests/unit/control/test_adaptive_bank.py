@@ -151,6 +151,24 @@ def test_before_the_first_reading_only_the_heat_under_way_is_known():
     assert BANK.observe(belief, 25.0, 1.0).sample == 0
 
 
+@pytest.mark.parametrize("away_k", [-20.0, 6.5, 20.0])
+@pytest.mark.parametrize("missing", [0, 3])
+def test_a_first_reading_that_the_second_contradicts_begins_nothing(away_k, missing):
+    right, wrong = BANK.start(), BANK.observe(BANK.start(), 25.0 + away_k, 0.0)
+    for _ in range(missing):
+        right, wrong = BANK.observe(right, math.nan, 0.0), BANK.observe(wrong, math.nan, 0.0)
+    right, wrong = BANK.observe(right, 25.0, 0.0), BANK.observe(wrong, 25.0, 0.0)
+    assert wrong.block.tobytes() == right.block.tobytes()
+    assert wrong.noise == right.noise
+
+
+def test_a_plant_that_moves_that_fast_is_begun_no_more_than_twice():
+    belief = BANK.start()
+    for n in range(6):
+        belief = BANK.observe(belief, 25.0 + 5.0 * n, 1.0)
+    assert belief.noise.samples == 5
+
+
 def test_one_outlier_and_a_second_change_nothing_and_the_third_moves_the_water():
     belief, y = warmed(noise_k=0.003)
     reached = []

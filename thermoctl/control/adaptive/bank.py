@@ -258,6 +258,18 @@ class Bank:
             block = filters.restarted(belief.block, self.hypotheses, y_c)
         return self._predicted(block, ahead.path, belief.sample + 1, ahead.unrest)
 
+    def _misled(self, belief: BankBelief, block: filters.Block | None, y_c: float) -> bool:
+        """Return whether the first reading was wrong, as the second one, `y_c`, is far from it.
+
+        Nothing was there to hold the first against, and what it is missed by would pass for gain.
+        Once is enough: a plant that does move as fast goes on from the second reading.
+        """
+        if block is None or belief.sample != belief.blind:
+            return False
+        m = belief.weights.likeliest
+        nu, S_m = y_c - float(block[Z, X, m]), float(block[Z, Z, m]) + belief.noise.believed
+        return nu * nu > self.hearing.gate_sds**2 * S_m
+
     def _unseen(self, belief: BankBelief, ahead: Ahead) -> Met:
         """Return what becomes of the prediction without a reading: for some time, the belief."""
         _, blind, _, _, noise, gate, weights, drifting, *_ = belief
@@ -271,6 +283,9 @@ class Bank:
         sample, share, heard = belief.sample + 1, ahead.excitation.share, 0.0
         weights, drifting, noise = belief.weights, belief.drifting, belief.noise.after(y_c)
         block, surprise_k = ahead.block, math.nan
+        if belief.noise.samples == 1 and self._misled(belief, block, y_c):
+            belief, noise = belief._replace(block=None), Noise().after(y_c)
+            block = None
         if block is None:
             block = self._begun(belief, ahead, y_c)
         else:
