@@ -284,8 +284,7 @@ class Bank:
         weights, drifting, noise = belief.weights, belief.drifting, belief.noise.after(y_c)
         block, surprise_k = ahead.block, math.nan
         if belief.noise.samples == 1 and self._misled(belief, block, y_c):
-            belief, noise = belief._replace(block=None), Noise().after(y_c)
-            block = None
+            belief, noise, block = belief._replace(block=None), Noise().after(y_c), None
         if block is None:
             block = self._begun(belief, ahead, y_c)
         else:
