@@ -11,17 +11,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
 from thermoctl.control.adaptive import evidence, filters, path
-from thermoctl.control.adaptive.coasting import Outlook, outlook
+from thermoctl.control.adaptive.bank_belief import Ahead, BankBelief, Met, Twin
+from thermoctl.control.adaptive.coasting import outlook
 from thermoctl.control.adaptive.constants import Hearing, Lags, Plants
 from thermoctl.control.adaptive.evidence import (
     EVIDENCE_FROM,
     GATE_SAMPLES,
     QUIET_SAMPLES,
+    UNHEARD,
     Drifting,
     Excitation,
     Gate,
@@ -38,82 +39,8 @@ LOSS_FROM_S = 60.0
 BLIND_S = 300.0
 """Without a reading for so long the filters stand still: what they would go on adding up says
 nothing of the water any more. Gain, loss and weights are kept, water and sensor begin anew."""
-
-
-class BankBelief(NamedTuple):
-    """What the bank believes after a sample.
-
-    Parameters
-    ----------
-    sample : int
-        Number of the last sample; the first valid reading is 0, and before it is -1.
-    blind : int
-        Samples in a row without a valid reading.
-    excitation, path : Excitation, Path
-        How the power moved, and where it is on its way.
-    noise, gate : Noise, Gate
-        What the readings were like.
-    weights : Weights
-        How likely each hypothesis is.
-    drifting : Drifting
-        Whether the water drifts by itself.
-    heard : float
-        What the last sample counted as evidence for or against them, in [0, 1].
-    surprise_k : float
-        The last reading less what the hypotheses expected, weighted as they were before it; NaN
-        where there was no reading, or nothing to expect.
-    block : ndarray, shape (4, 5, n) or None
-        The filters; None before the first valid reading.
-    outlook : Outlook or None
-        What follows for control; None before the first valid reading.
-    prior : Prior
-        Gain and loss to begin with; once there are filters, they know better.
-    """
-
-    sample: int
-    blind: int
-    excitation: Excitation
-    path: Path
-    noise: Noise
-    gate: Gate
-    weights: Weights
-    drifting: Drifting
-    heard: float = 0.0
-    surprise_k: float = math.nan
-    block: filters.Block | None = None
-    outlook: Outlook | None = None
-    prior: filters.Prior = filters.UNKNOWN
-
-
-class Ahead(NamedTuple):
-    """What a period makes of a belief before the reading at its end is seen.
-
-    Parameters
-    ----------
-    excitation, path : Excitation, Path
-        As in the belief to come.
-    unrest : float
-        How far the power was from what holds the water; 0 while that is not known.
-    block : ndarray, shape (4, 5, n) or None
-        The filters; None where nothing is foreseen, at the start or after a long gap.
-    """
-
-    excitation: Excitation
-    path: Path
-    unrest: float
-    block: filters.Block | None
-
-
-class Met(NamedTuple):
-    """The part of a belief that readings change."""
-
-    noise: Noise
-    gate: Gate
-    weights: Weights
-    drifting: Drifting
-    heard: float
-    surprise_k: float
-    block: filters.Block
+ONSET_SAMPLES = 10
+"""So many samples at least have to tell whether the plant was met at rest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,18 +93,32 @@ class Bank:
         """Least and most power."""
         return self.u_min, self.u_max
 
-    def start(self) -> BankBelief:
-        """Return the belief before the first sample."""
-        return BankBelief(
+    def start(
+        self,
+        prior: filters.Prior = filters.UNKNOWN,
+        noise: Noise = UNHEARD,
+        weights: Weights | None = None,
+    ) -> BankBelief:
+        """Return the belief before the first sample; power may have been full before.
+
+        Parameters
+        ----------
+        prior, noise, weights : Prior, Noise, Weights
+            What is known from elsewhere.
+        """
+        begun = BankBelief(
             -1,
             0,
             Excitation(),
             path.at_rest(self.hypotheses),
-            Noise(),
+            noise,
             Gate(),
-            evidence.equal(self.hypotheses),
+            evidence.equal(self.hypotheses) if weights is None else weights,
             Drifting(),
+            prior=prior,
         )
+        heated = begun._replace(path=path.at_rest(self.hypotheses, self.u_max))
+        return begun._replace(twin=Twin(heated, odds=0.0, heated=True))
 
     def observe(self, belief: BankBelief, y_c: float, applied: float) -> BankBelief:
         """Return the belief after a period of `applied` and the reading `y_c`.
@@ -213,7 +154,8 @@ class Bank:
             block = self._predicted(block, way, belief.sample + 1, unrest)
         else:
             block = None
-        return Ahead(excitation, way, unrest, block)
+        twin = None if belief.twin is None else self.ahead(belief.twin.belief, applied)
+        return Ahead(excitation, way, unrest, block, twin)
 
     def met(self, belief: BankBelief, ahead: Ahead, y_c: float) -> BankBelief:
         """Return the belief after the reading `y_c` at the end of the period `ahead`.
@@ -223,6 +165,56 @@ class Bank:
         ArithmeticError
             The result would not be finite; `belief` is still good.
         """
+        after = self._met(belief, ahead, y_c)
+        return after if belief.twin is None else self._led(belief, ahead, after, y_c)
+
+    def foretold(self, belief: BankBelief, ahead: Ahead, y_c: float) -> float:
+        """Return the log likelihood of `y_c`; of twins that of both, as far as likely."""
+        alone, twin = self._foretold(belief, ahead, y_c), belief.twin
+        if twin is None or ahead.twin is None:
+            return alone
+        other = self._foretold(twin.belief, ahead.twin, y_c)
+        odds = twin.odds - self.hearing.onset_odds
+        share = 1.0 / (1.0 + math.exp(-odds if twin.heated else odds))
+        most = max(alone, other)
+        both = (1.0 - share) * math.exp(alone - most) + share * math.exp(other - most)
+        return most + math.log(both)
+
+    def _foretold(self, belief: BankBelief, ahead: Ahead, y_c: float) -> float:
+        r"""Return the log likelihood of `y_c`; 0 where nothing was foreseen, or it is NaN.
+
+        It is that of the hypotheses together, without a constant:
+        :math:`\ln \sum_j w_j \, S_j^{-1/2} e^{-\min(\nu_j^2/S_j,\,25)/2}`.
+        """
+        block = ahead.block
+        if block is None or not math.isfinite(y_c):
+            return 0.0
+        nu = y_c - block[Z, X]
+        S = block[Z, Z] + belief.noise.believed
+        nis = np.minimum(nu * nu / S, self.hearing.gate_sds**2)
+        log = belief.weights.log - 0.5 * (np.log(S) + nis)
+        most = float(log.max())
+        return most + math.log(float(np.exp(log - most).sum() * belief.weights.share.max()))
+
+    def _led(self, belief: BankBelief, ahead: Ahead, after: BankBelief, y_c: float) -> BankBelief:
+        """Return `after` or its twin, whichever leads, and for some time the other with it."""
+        twin, hearing = belief.twin, self.hearing
+        assert twin is not None
+        assert ahead.twin is not None
+        other = self._met(twin.belief, ahead.twin, y_c)
+        for_twin = self._foretold(twin.belief, ahead.twin, y_c) - self._foretold(belief, ahead, y_c)
+        for_heat = for_twin if twin.heated else -for_twin
+        odds = twin.odds + clamp(for_heat, -hearing.onset_most, hearing.onset_most)
+        heat_leads = odds > hearing.onset_odds
+        if heat_leads == twin.heated:
+            after, other = other, after
+        n = after.sample
+        if n >= ONSET_SAMPLES and n * self.period_s >= hearing.onset_s:
+            return after._replace(twin=None)
+        return after._replace(twin=Twin(other, odds, heated=not heat_leads))
+
+    def _met(self, belief: BankBelief, ahead: Ahead, y_c: float) -> BankBelief:
+        """Return the belief after `y_c`, without a twin."""
         seen, way = math.isfinite(y_c), ahead.path
         if belief.block is None and not seen:
             return belief._replace(path=way, excitation=ahead.excitation)
@@ -238,7 +230,8 @@ class Bank:
     def lost(self, belief: BankBelief) -> BankBelief:
         """Return the belief after a gap of which the applied power is not known."""
         blind = max(belief.blind, math.ceil(BLIND_S / self.period_s)) + 1
-        return belief._replace(blind=blind, gate=Gate(), path=path.at_rest(self.hypotheses))
+        way = path.at_rest(self.hypotheses)
+        return belief._replace(blind=blind, gate=Gate(), path=way, twin=None)
 
     def _predicted(
         self, block: filters.Block, way: Path, sample: int, unrest: float
@@ -253,7 +246,7 @@ class Bank:
     def _begun(self, belief: BankBelief, ahead: Ahead, y_c: float) -> filters.Block:
         """Return the block where nothing was foreseen: the first, or the first after a gap."""
         if belief.block is None:
-            block = filters.start(self.hypotheses, y_c, belief.prior)
+            block = filters.start(self.hypotheses, y_c, belief.prior, ahead.path.heat)
         else:
             block = filters.restarted(belief.block, self.hypotheses, y_c)
         return self._predicted(block, ahead.path, belief.sample + 1, ahead.unrest)

@@ -151,6 +151,12 @@ class Hearing:
         Sums of innovations beyond the first: power that moves is no evidence. Beyond the second:
         the loss has changed. White ones are beyond 3 for 6 % of the time, and reach 14 three times
         in ten million samples: about once in 40 days without a move of the power.
+    onset_s : float
+        So long it is open whether power was full before the first reading, or none.
+    onset_odds : float
+        It was full beyond these log odds, 2.2 to 1: most plants are met at rest.
+    onset_most : float
+        More than this no reading adds to the odds: of the noise little is known yet.
 
     Raises
     ------
@@ -167,6 +173,9 @@ class Hearing:
     quiet_power: float = ranged(0.15, 0.0, 1.0)
     suspected_sds: float = ranged(3.0, 0.1, 1e6)
     drifted_sds: float = ranged(14.0, 1.0, 1e6)
+    onset_s: float = ranged(30.0, 0.0, 1e5)
+    onset_odds: float = ranged(0.8, 0.0, 100.0)
+    onset_most: float = ranged(0.6, 0.0, 100.0)
 
     def __post_init__(self) -> None:
         check_ranges(self)

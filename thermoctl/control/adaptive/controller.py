@@ -11,7 +11,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, NamedTuple
 
 from thermoctl.control.adaptive import trial
-from thermoctl.control.adaptive.bank import Bank, BankBelief
+from thermoctl.control.adaptive.bank import Bank
+from thermoctl.control.adaptive.bank_belief import BankBelief
 from thermoctl.control.adaptive.coasting import Outlook, ahead, power_for
 from thermoctl.control.adaptive.constants import Hearing, Lags, Pace, Plants
 from thermoctl.control.adaptive.plant_belief import (
@@ -156,7 +157,7 @@ class Adaptive:
         if remembered.get("action") != self.action:
             raise ValueError(f"expected action {self.action!r}, got {remembered.get('action')!r}")
         bank = recalled(self.bank, remembered, age_s)
-        rival = self.bank.start()._replace(noise=bank.noise)
+        rival = self.bank.start(noise=bank.noise)
         return AdaptiveBelief(bank, memory=Memory(rival))
 
     def remember(self, belief: AdaptiveBelief) -> Mapping[str, Any] | None:

@@ -59,6 +59,10 @@ class Noise(NamedTuple):
         return max(self.variance, NOISE_MIN_K2)
 
 
+UNHEARD = Noise()
+"""Before the first reading."""
+
+
 # -- excitation -----------------------------------------------------------------------------------
 
 

@@ -133,14 +133,23 @@ def per_period(hypotheses: Hypotheses, plants: Plants, u_min: float, u_max: floa
     )
 
 
-def start(hypotheses: Hypotheses, y_c: float, prior: Prior = UNKNOWN) -> Block:
-    """Return the block of a plant at rest at its first reading."""
+def start(
+    hypotheses: Hypotheses, y_c: float, prior: Prior = UNKNOWN, heat: Array | None = None
+) -> Block:
+    """Return the block at the first reading of a plant, at rest or long under `heat`.
+
+    Under heat the sensor is behind the water by what beta does in its lag.
+    """
     h, block = hypotheses.period_s, np.zeros((4, 5, len(hypotheses)))
     sd = np.array([*START_SD[:D], prior.loss_sd * h, prior.gain_sd * h])
     P = np.diag(sd**2)
     P[T, Z] = P[Z, T] = START_CORRELATION * sd[T] * sd[Z]
     block[:, :X] = P[:, :, None]
     block[:, X] = np.array([y_c, y_c, prior.loss * h, prior.gain * h])[:, None]
+    if heat is not None:
+        behind = hypotheses.sensor * heat
+        block[T] += behind * block[BETA]
+        block[:, T] += behind * block[:, BETA]
     return block
 
 

@@ -44,8 +44,8 @@ class Hypotheses:
         Its square, in s^2.
     dead : ndarray of int
         Dead time in whole periods.
-    element : ndarray
-        Time constant of the heater in periods.
+    element, sensor : ndarray
+        Time constants of heater and sensor in periods.
     held : ndarray
         Periods for which power is under way, through dead time and heater.
     element_step, sensor_step : ndarray
@@ -60,6 +60,7 @@ class Hypotheses:
     lag_squared: Array
     dead: npt.NDArray[np.intp]
     element: Array
+    sensor: Array
     held: Array
     element_step: Array
     sensor_step: Array
@@ -96,6 +97,7 @@ class Hypotheses:
             lag_squared=lag_s * lag_s,
             dead=dead.astype(np.intp),
             element=element,
+            sensor=sensor,
             held=dead + element,
             element_step=element_step,
             sensor_step=sensor_step,

@@ -36,9 +36,11 @@ class Path(NamedTuple):
     mean: Array
 
 
-def at_rest(hypotheses: Hypotheses) -> Path:
-    """Return the path of a plant that never got any power."""
-    return Path(np.zeros(int(hypotheses.dead.max()) + 1), *np.zeros((3, len(hypotheses))))
+def at_rest(hypotheses: Hypotheses, power: float = 0.0) -> Path:
+    """Return the path of a plant that has had this `power` for long."""
+    powers = np.full(int(hypotheses.dead.max()) + 1, power)
+    heat = np.full(len(hypotheses), power)
+    return Path(powers, power * hypotheses.held, heat, heat)
 
 
 def pushed(path: Path, hypotheses: Hypotheses, power: float) -> Path:

@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from thermoctl.control.adaptive.bank import Bank, BankBelief
+from thermoctl.control.adaptive.bank import Bank
+from thermoctl.control.adaptive.bank_belief import BankBelief
 from thermoctl.control.adaptive.filters import BETA, D, X
 from thermoctl.control.adaptive.hypotheses import SHAPES
 from thermoctl.signals import PlantBelief

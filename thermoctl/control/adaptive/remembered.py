@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from thermoctl.control.adaptive.bank import Bank, BankBelief
+from thermoctl.control.adaptive.bank import Bank
+from thermoctl.control.adaptive.bank_belief import BankBelief
 from thermoctl.control.adaptive.evidence import FLOOR, Noise, weighted
 from thermoctl.control.adaptive.filters import (
     GAIN_LEAST,
@@ -96,7 +97,7 @@ def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBel
         max(lost_sd, LOSS_SHARE * rate),
     )
     weights = weighted(np.maximum(WEIGHT_POWER * log, WEIGHT_FLOOR))
-    return bank.start()._replace(noise=Noise(variance), weights=weights, prior=prior)
+    return bank.start(prior, Noise(variance), weights)
 
 
 def _hypotheses(bank: Bank) -> dict[str, Any]:

@@ -1,11 +1,8 @@
-r"""Whether a remembered bank foresees better than one that knows nothing.
+"""Whether a remembered bank foresees better than one that knows nothing.
 
 Both see the same samples, and the remembered one steers. Every reading is a prediction put to the
-test: the log odds between the two grow by the difference of
-
-.. math:: \ell = \ln \sum_j w_j \, S_j^{-1/2} e^{-\min(\nu_j^2/S_j,\,25)/2}
-
-as often as the sample counts as evidence, ALF (6)-(7) with two models in place of many. So the
+test: the log odds between the two grow by the difference of its log likelihoods, `Bank.foretold`,
+as far as the sample counts as evidence, ALF (6)-(7) with two models in place of many. So the
 odds are those of Bayes: a model that is right gains on one that expects anything, and one that is
 wrong loses to it. The loser is dropped, and from then on there is one bank again.
 
@@ -17,11 +14,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from thermoctl.control.adaptive.bank import Ahead, Bank, BankBelief
+from thermoctl.control.adaptive.bank import Bank
+from thermoctl.control.adaptive.bank_belief import BankBelief
 from thermoctl.control.adaptive.evidence import EVIDENCE_FROM
-from thermoctl.control.adaptive.filters import X, Z
 
 DROP_ODDS = -3.0
 """Log odds at which the remembered bank goes: 20 to 1 against it."""
@@ -74,7 +69,7 @@ def met(
     if math.isfinite(y_c) and after.sample >= EVIDENCE_FROM:
         heard = after.excitation.share
     if heard > 0.0:
-        odds += heard * (foretold(law, bank, ahead, y_c) - foretold(law, rival, rivals, y_c))
+        odds += heard * (law.foretold(bank, ahead, y_c) - law.foretold(rival, rivals, y_c))
     heard_s = memory.heard_s + heard * law.period_s
     return _judged(after, Memory(law.met(rival, rivals, y_c), odds, heard_s))
 
@@ -98,16 +93,3 @@ def _judged(bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:
     if heard_s >= enough_s:
         return bank, Memory(None, odds, heard_s, TRUSTED, words)
     return bank, memory
-
-
-def foretold(law: Bank, belief: BankBelief, ahead: Ahead, y_c: float) -> float:
-    """Return the log likelihood of `y_c` as foreseen; 0 where nothing was."""
-    block = ahead.block
-    if block is None:
-        return 0.0
-    nu = y_c - block[Z, X]
-    S = block[Z, Z] + belief.noise.believed
-    nis = np.minimum(nu * nu / S, law.hearing.gate_sds**2)
-    log = belief.weights.log - 0.5 * (np.log(S) + nis)
-    most = float(log.max())
-    return most + math.log(float(np.exp(log - most).sum() * belief.weights.share.max()))

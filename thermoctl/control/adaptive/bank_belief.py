@@ -1,0 +1,111 @@
+"""What a bank of filters believes, and what it becomes from sample to sample."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from thermoctl.control.adaptive import filters
+from thermoctl.control.adaptive.coasting import Outlook
+from thermoctl.control.adaptive.evidence import Drifting, Excitation, Gate, Noise, Weights
+from thermoctl.control.adaptive.path import Path
+
+
+class BankBelief(NamedTuple):
+    """What the bank believes after a sample.
+
+    Parameters
+    ----------
+    sample : int
+        Number of the last sample; the first valid reading is 0, and before it is -1.
+    blind : int
+        Samples in a row without a valid reading.
+    excitation, path : Excitation, Path
+        How the power moved, and where it is on its way.
+    noise, gate : Noise, Gate
+        What the readings were like.
+    weights : Weights
+        How likely each hypothesis is.
+    drifting : Drifting
+        Whether the water drifts by itself.
+    heard : float
+        What the last sample counted as evidence for or against them, in [0, 1].
+    surprise_k : float
+        The last reading less what the hypotheses expected, weighted as they were before it; NaN
+        where there was no reading, or nothing to expect.
+    block : ndarray, shape (4, 5, n) or None
+        The filters; None before the first valid reading.
+    outlook : Outlook or None
+        What follows for control; None before the first valid reading.
+    prior : Prior
+        Gain and loss to begin with; once there are filters, they know better.
+    twin : Twin or None
+        The same, had the plant been met in the other state; None once that is settled.
+    """
+
+    sample: int
+    blind: int
+    excitation: Excitation
+    path: Path
+    noise: Noise
+    gate: Gate
+    weights: Weights
+    drifting: Drifting
+    heard: float = 0.0
+    surprise_k: float = math.nan
+    block: filters.Block | None = None
+    outlook: Outlook | None = None
+    prior: filters.Prior = filters.UNKNOWN
+    twin: Twin | None = None
+
+
+class Twin(NamedTuple):
+    """The same plant, had it been met otherwise: at rest, or under full power.
+
+    Parameters
+    ----------
+    belief : BankBelief
+        The one of the two that does not lead.
+    odds : float
+        Natural logarithm of the odds that there was heat.
+    heated : bool
+        Whether it is `belief` that has it.
+    """
+
+    belief: BankBelief
+    odds: float
+    heated: bool
+
+
+class Ahead(NamedTuple):
+    """What a period makes of a belief before the reading at its end is seen.
+
+    Parameters
+    ----------
+    excitation, path : Excitation, Path
+        As in the belief to come.
+    unrest : float
+        How far the power was from what holds the water; 0 while that is not known.
+    block : ndarray, shape (4, 5, n) or None
+        The filters; None where nothing is foreseen, at the start or after a long gap.
+    twin : Ahead or None
+        The same of the twin.
+    """
+
+    excitation: Excitation
+    path: Path
+    unrest: float
+    block: filters.Block | None
+    twin: Ahead | None = None
+
+
+class Met(NamedTuple):
+    """The part of a belief that readings change."""
+
+    noise: Noise
+    gate: Gate
+    weights: Weights
+    drifting: Drifting
+    heard: float
+    surprise_k: float
+    block: filters.Block
