@@ -112,8 +112,13 @@ class HeatDoubt:
 
     def trust(self) -> None:
         """Take the loss for what it is now: the heater was asked, and answers."""
-        self._stood_power = self._proven_power = self._needed
+        self.stand_by()
         self._answered_s = ANSWERED_S
+
+    def stand_by(self) -> None:
+        """Take the power that is needed now for what holds the reading."""
+        self._stood_power = self._proven_power = self._needed
+        self._crept_s = 0.0
 
     def distrust(self, gain: Gain, fell: float) -> None:
         """Take for the loss no more than the reading `fell` without power, in K/s.
@@ -142,8 +147,16 @@ class HeatDoubt:
 
     def cold(self, gain: Gain, sd_k: float, *, again: bool = False) -> bool:
         """Return whether the reading fails to answer; sooner `again`, after a bad answer."""
-        limit_k = _limit_k(gain, sd_k, LAGS_AGAIN if again else LAGS)
-        return self._missing_k > limit_k or self.crept
+        return self.crept or self.short(gain, sd_k, again=again)
+
+    def short(self, gain: Gain, sd_k: float, *, again: bool) -> bool:
+        """Return whether the reading has not risen as the heat should have made it."""
+        return self._missing_k > _limit_k(gain, sd_k, LAGS_AGAIN if again else LAGS)
+
+    @property
+    def crept_s(self) -> float:
+        """How long the loss has been larger while the reading stood still, in s."""
+        return self._crept_s
 
     @property
     def crept(self) -> bool:

@@ -59,6 +59,7 @@ class Answer(Enum):
     HEATS = "heats"
     NOTHING = "nothing"
     COOLS = "cools"
+    HIDDEN = "hidden"
 
 
 class Contrast(NamedTuple):
@@ -96,18 +97,22 @@ def contrast(rows: Sequence[Seen], sd_k: float) -> Contrast | None:
     return Contrast(mean, CAUTION * np.sqrt(variance / heats), left, alike)
 
 
+def near(known: Gain) -> range:
+    """Return the places of the lags that a heater which is `known` may have."""
+    return range(max(known.place - 1, 0), min(known.place + 2, len(LAGS_S)))
+
+
 def of_known(found: Contrast, known: Gain, sure: float = SURE) -> tuple[Answer, Gain]:
     """Return what `found` says of a known heater, and the gain it shows.
 
     An answer has to differ from nothing by `sure` standard deviations.
     """
-    last = len(LAGS_S) - 1
-    near = range(max(known.place - 1, 0), min(known.place + 1, last) + 1)
-    shown = found.best(near)
+    places = near(known)
+    shown = found.best(places)
     if abs(shown.mean) > max(ANSWERS * known.mean, sure * shown.sd):
         return (Answer.HEATS if shown.mean > 0.0 else Answer.COOLS), shown
-    small = [abs(found.mean[place]) < NOTHING * known.mean for place in near]
-    seen = [SURE * found.sd[place] < known.mean for place in near]
+    small = [abs(found.mean[place]) < NOTHING * known.mean for place in places]
+    seen = [SURE * found.sd[place] < known.mean for place in places]
     return (Answer.NOTHING if all(small) and all(seen) else Answer.OPEN), shown
 
 

@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import NamedTuple
 
-from thermoctl.regulator.heater import climb, question, trial
+from thermoctl.regulator.heater import climb, evidence, question, trial
 from thermoctl.regulator.heater.blocks import Blocks, Repeats
 from thermoctl.regulator.heater.check import HeaterCheck
 from thermoctl.regulator.heater.climb import Climb
+from thermoctl.regulator.heater.cut import Cut
 from thermoctl.regulator.heater.doubt import HeatDoubt, Seen
 from thermoctl.regulator.heater.known import OFF_LAGS, KnownHeater, arrived
-from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S, Answer
+from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S, CREPT_LAGS, Answer
 from thermoctl.regulator.heater.response import Block, Gain, HeatResponse
 from thermoctl.regulator.heater.trial import Trial
 from thermoctl.regulator.supervisor import Emit, Supervisor
@@ -46,16 +46,11 @@ _LIKELY_TEXT = "{:.0f} s without power do not show it surely, but a gain of {:.2
 _WILD_TEXT = (
     "the reading fell faster than any heater can make it: the next heat is what it is asked by"
 )
+_LOAD_TEXT = (
+    "after {:.0f} s without power a load explains why more was needed, a dead heater does not"
+)
+_HIDDEN_TEXT = "{:.0f} s without power show less than a load that comes and goes may hide"
 _FAULTS = {"heater.no_response": 23, "heater.reversed": 3, "heater.stuck_on": 24}
-
-
-class _Cut(NamedTuple):
-    """When a question was put, what it looks at, why, and if readings were wild."""
-
-    at_s: float
-    from_s: float
-    why: str
-    wild: bool = False
 
 
 class HeaterWatch:
@@ -85,7 +80,7 @@ class HeaterWatch:
         self._heater = KnownHeater()
         self._settled_s = 0.0  # from then on, what was on its way at the start has arrived
         self._rows: deque[Seen] = deque(maxlen=ROWS)
-        self._cut: _Cut | None = None
+        self._cut: Cut | None = None
         self._t_s = self._off_s = 0.0
         self._failed_s = -math.inf
         self._refused_c = -math.inf  # what an unknown one that answered badly has to rise beyond
@@ -179,13 +174,14 @@ class HeaterWatch:
             self._doubt.begin(before, now)
         if rising.stalled(block.sd_k) and block.power >= OFF:
             lag_s = 0.0 if known is None else known.lag_s
-            self._ask(now, now.t_s - max(BEFORE_LAGS * lag_s, climb.STALLED_S), rising.told(now))
+            from_s = now.t_s - max(BEFORE_LAGS * lag_s, climb.STALLED_S)
+            self._ask(Cut(now.t_s, from_s, rising.told(now)))
 
     def _try(self, block: Block, now: Seen) -> None:
         """Let an unknown heater show a rise; ask it when it has had its heat."""
         why = self._trial.fails(self._heater.counts(block.power), block, now)
         if why:
-            self._ask(now, self._trial.from_s, why)
+            self._ask(Cut(now.t_s, self._trial.from_s, why))
 
     def _compare(self, known: Gain, block: Block, before: Seen, now: Seen, t_s: float) -> None:
         """Compare what a known heater should have done with what came."""
@@ -206,22 +202,39 @@ class HeaterWatch:
             rate = self._rising(known, now, sd_k)
             if rate > 0.0:  # nothing is proven while too few readings show a slope
                 self._fail("heater.stuck_on", question.told_of(rate), t_s)
+        elif self._crept(known, sd_k, again=again) and not hot and block.power >= OFF:
+            self._ask_of_creep(known, now, sd_k)
         elif hot or (doubt.cold(known, sd_k, again=True) and block.power >= OFF):
-            lags = question.CREPT_LAGS if doubt.crept else BEFORE_LAGS
+            lags = CREPT_LAGS if doubt.crept else BEFORE_LAGS
             from_s = self._t_s - max(lags * known.lag_s, BEFORE_S)
             since_s = from_s if doubt.since is None else min(doubt.since.t_s, from_s)
             wild = self._wild(known, since_s, WILD) or self._wild(known, from_s, WILD)
             lasts = wild and self._t_s - since_s >= max(BEFORE_LAGS * known.lag_s, WILD_S)
             if hot or lasts or doubt.cold(known, sd_k, again=again):
-                self._ask(now, from_s, doubt.told(known, now), wild=wild)
+                began_s = None if hot or wild else since_s
+                self._ask(Cut(now.t_s, from_s, doubt.told(known, now), wild, began_s))
+
+    def _crept(self, known: Gain, sd_k: float, *, again: bool) -> bool:
+        """Return whether nothing is in doubt but why the power has grown."""
+        return self._doubt.crept and not self._doubt.short(known, sd_k, again=again)
+
+    def _ask_of_creep(self, known: Gain, now: Seen, sd_k: float) -> None:
+        """Ask why the power has grown, unless the reading dipped and was brought back by it."""
+        began_s = now.t_s - self._doubt.crept_s - evidence.BEFORE_LAGS * known.lag_s
+        if evidence.odds(self._rows, began_s, known, sd_k) > evidence.SOUND:
+            self._doubt.stand_by()
+            return
+        from_s = now.t_s - max(CREPT_LAGS * known.lag_s, BEFORE_S)
+        why = self._doubt.told(known, now)
+        self._ask(Cut(now.t_s, from_s, why, began_s=began_s, crept=True))
 
     # -- a question ------------------------------------------------------------------------------
 
-    def _ask(self, now: Seen, from_s: float, why: str, *, wild: bool = False) -> None:
-        self._cut = _Cut(now.t_s, from_s, why, wild)
-        self._emit("heater.questioned", text=f"{why}; power is cut to see what it does")
+    def _ask(self, cut: Cut) -> None:
+        self._cut = cut
+        self._emit("heater.questioned", text=f"{cut.why}; power is cut to see what it does")
 
-    def _hear(self, cut: _Cut, block: Block, now: Seen, t_s: float) -> None:
+    def _hear(self, cut: Cut, block: Block, now: Seen, t_s: float) -> None:
         """Look for an answer; go on when it is a good one, fail when it is none."""
         known, lag_s, asked_s = self._heater.gain, self._heater.longer_s, now.t_s - cut.at_s
         if known is not None and self._heated(known, now, block.sd_k, t_s):
@@ -240,6 +253,8 @@ class HeaterWatch:
             if not self._wild(known, now.t_s - max(lag_s, BEFORE_S), RESTS):
                 self._emit("heater.answered", text=_WILD_TEXT)
                 self._suspect(known)
+        elif answer is Answer.HIDDEN:
+            self._leave_open(asked_s)
         elif answer is not Answer.OPEN:
             self._refuse(answer, cut, shown, asked_s, t_s)
         elif known is not None and asked_s > question.longest_s(known, block.sd_k):
@@ -247,6 +262,8 @@ class HeaterWatch:
             if answer is Answer.HEATS:
                 self._emit("heater.answered", text=_LIKELY_TEXT.format(asked_s, shown.mean))
                 self._trust()
+            elif answer is Answer.HIDDEN:
+                self._leave_open(asked_s)
             else:
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
         elif known is None and asked_s > self._trial.listens_s(block.sd_k):
@@ -257,11 +274,24 @@ class HeaterWatch:
             self._trial.enlarge(block.sd_k)
             self._go_on()
 
-    def _answer(self, cut: _Cut, sd_k: float, sure: float = question.SURE) -> tuple[Answer, Gain]:
+    def _leave_open(self, asked_s: float) -> None:
+        """Go on: what is in doubt is the moment of the cut, and another one tells."""
+        self._emit("heater.answered", text=_HIDDEN_TEXT.format(asked_s))
+        self._go_on()
+
+    def _answer(self, cut: Cut, sd_k: float, sure: float = question.SURE) -> tuple[Answer, Gain]:
         """Return what the reading says so far, and the gain it shows."""
         known, climbed = self._heater.gain, climb.SHOWS * self._climb.shown
         if known is not None:
-            return question.of_known_rows(self._rows, cut.from_s, cut.at_s, known, sd_k, sure)
+            answer, shown = question.of_known_rows(
+                self._rows, cut.from_s, cut.at_s, known, sd_k, sure
+            )
+            late = sure < question.SURE
+            if cut.began_s is None or (answer is Answer.HEATS and not late):
+                return answer, shown
+            odds = evidence.odds(self._rows, cut.began_s, known, sd_k)
+            answer = evidence.weigh(answer, odds, crept=cut.crept, late=late)
+            return answer, known if odds > evidence.SOUND else shown
         weakest, froms_s = max(self._weakest, climbed), [cut.from_s]
         if not climbed:  # what has climbed may have failed since
             froms_s += [self._trial.since_s, -math.inf]
@@ -290,6 +320,8 @@ class HeaterWatch:
     def _accept(self, shown: Gain, asked_s: float) -> None:
         """Go on with a heater that heats, and with the gain it has shown if that is news."""
         text = f"{asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s"
+        if shown is self.known:  # not by the question alone
+            text = _LOAD_TEXT.format(asked_s)
         self._emit("heater.answered", text=text)
         self._heater.accept(shown)
         self._trial.begin(self._t_s)
@@ -302,7 +334,7 @@ class HeaterWatch:
         self._climb.clear()
         self._go_on()
 
-    def _refuse(self, answer: Answer, cut: _Cut, shown: Gain, asked_s: float, t_s: float) -> None:
+    def _refuse(self, answer: Answer, cut: Cut, shown: Gain, asked_s: float, t_s: float) -> None:
         """Fail a heater that answered with nothing, or the wrong way.
 
         One that is not known is asked a second time before anybody is told: while a plant that was

@@ -1,0 +1,30 @@
+"""A question that is being put: since when the power is cut, and why."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Cut(NamedTuple):
+    """A cut of the power.
+
+    Parameters
+    ----------
+    at_s, from_s : float
+        When it began, and since when readings are looked at for the answer.
+    why : str
+        What was expected, and what came.
+    wild : bool
+        Whether the reading fell faster than any heater can make it.
+    began_s : float or None
+        Since when there was a doubt, where a load may be the reason of it.
+    crept : bool
+        Whether nothing is in doubt but why the power that holds the reading has grown.
+    """
+
+    at_s: float
+    from_s: float
+    why: str
+    wild: bool = False
+    began_s: float | None = None
+    crept: bool = False
