@@ -160,6 +160,9 @@ class Situation:
         How fast `setpoint_c` moves, with its sign; 0 at the end of a ramp.
     target_c : float
         Where the ramp ends; NaN where nobody said.
+    commanded : float
+        Power that was commanded for that interval, whoever asked for it: what limits have left of
+        it. An output that is not exact makes `applied` of it. NaN where nobody said.
     """
 
     t_s: float
@@ -173,6 +176,7 @@ class Situation:
     measured_c: float = math.nan
     setpoint_rate_k_per_s: float = 0.0
     target_c: float = math.nan
+    commanded: float = math.nan
 
 
 @runtime_checkable

@@ -22,6 +22,9 @@ from thermoctl.quantities import is_finite_number
 from thermoctl.ranges import require
 from thermoctl.signals import Beliefs
 
+INEXACT = 0.1
+"""An output that gives less than its command by more than this is limited, and not inexact."""
+
 
 @dataclass(frozen=True, slots=True)
 class PidBelief:
@@ -176,13 +179,13 @@ class Pid:
         if self.autotune is not None:
             tuning = self.autotune.observe(tuning, situation)
         before, interval_s = belief.terms, situation.interval_s
-        setpoint_c, applied = situation.setpoint_c, situation.applied
+        setpoint_c, given = situation.setpoint_c, _given(situation)
         terms = law.see(before, situation.temperature_c, interval_s)
         known = math.isfinite(before.seen_c) and math.isfinite(setpoint_c)
         if known and math.isfinite(before.asked) and interval_s < law.gains.integral_s:
-            terms = law.integrate(terms, setpoint_c, applied, interval_s)
+            terms = law.integrate(terms, setpoint_c, given, interval_s)
         elif known:
-            terms = law.track(terms, setpoint_c, applied)
+            terms = law.track(terms, setpoint_c, given)
         return PidBelief(replace(terms, asked=math.nan), tuning, belief.kept)
 
     def decide(self, belief: PidBelief, situation: Situation) -> tuple[PidBelief, float]:
@@ -242,6 +245,18 @@ class Pid:
         if tuning.run is not None:
             return {"controller.tuning": f"{self.tuning}, at most {self.tuning_limit_s:g} s"}
         return {}
+
+
+def _given(situation: Situation) -> float:
+    """Return the power that limits and others have left of what was asked for.
+
+    An output that gives more than the command, or a little less, is not exact, and its error is for
+    the integral to find: a law that follows it adds it to its own power at every sample.
+    """
+    applied, commanded = situation.applied, situation.commanded
+    if math.isnan(commanded) or abs(applied) < abs(commanded) - INEXACT:
+        return applied
+    return commanded
 
 
 def _in_words(gains: Gains) -> str:

@@ -81,6 +81,7 @@ class Learning:
         measured_c: float,
         reference: Reference,
         applied: float,
+        commanded: float,
     ) -> Situation:
         """Return what controllers may know of this sample."""
         known = self._belief if self._foreseen is None else self._foreseen
@@ -96,6 +97,7 @@ class Learning:
             measured_c,
             reference.rate_k_per_s,
             reference.target_c,
+            commanded,
         )
 
     def pole(self, t_s: float) -> Pole:

@@ -197,7 +197,8 @@ class Regulator:
     def step(self, measurement: Measurement) -> Step:
         """Return what is made of `measurement`; never raises, whatever it holds."""
         t_s, interval_s = self._time(measurement.t_s)
-        applied = self._applied_power() - self._load.mean(t_s, interval_s)
+        load = self._load.mean(t_s, interval_s)
+        applied, commanded = self._applied_power() - load, self._command.power - load
         verdict = self._supervisor.judge(measurement, t_s, interval_s, self._jump_k)
         temperature_c = float(measurement.temperature_c) if verdict is Verdict.GOOD else math.nan
         self._learning.observe(temperature_c, self._given(applied, interval_s), t_s)
@@ -206,7 +207,9 @@ class Regulator:
         seen_s = self._supervisor.seen_s
         self._learning.hold(temperature_c - self._wishes.setpoint_c, applied, seen_s)
         reference = self._wishes.approach(temperature_c, seen_s, self._supervisor.state)
-        situation = self._learning.situation(t_s, interval_s, temperature_c, reference, applied)
+        situation = self._learning.situation(
+            t_s, interval_s, temperature_c, reference, applied, commanded
+        )
         self._steering.observe(situation)
         self._shadow.observe(situation, self._steering.mind)
         pole, holding_power = self._learning.pole(t_s), self._learning.holding_power

@@ -37,6 +37,10 @@ DOUBTFUL_LEAST, DOUBTFUL_MOST = 2.0, 0.9
 With more than this share of the most under way it rests on the other one, and power is too strong
 an answer to any error."""
 
+INEXACT_S, INEXACT = 30.0, 0.1
+"""How far outputs are off their commands is averaged over such a time; by more than that share they
+are limited, and not inexact."""
+
 SDS_EVERY = 5
 """Standard deviations change slowly: they are reckoned anew after so many samples."""
 
@@ -67,6 +71,8 @@ class AdaptiveBelief(NamedTuple):
         How well gain and holding power were known, at most `SDS_EVERY` samples ago.
     surprise_k : float
         This reading less what was expected of it; NaN: not known, or not of one period.
+    inexact : float
+        How much more power than the command the output gives, in the mean of some time.
     """
 
     bank: BankBelief
@@ -77,6 +83,7 @@ class AdaptiveBelief(NamedTuple):
     memory: Memory = Memory()
     sds: Sds = Sds()
     surprise_k: float = math.nan
+    inexact: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +183,7 @@ class Adaptive:
         h, interval_s = self.period_s, situation.interval_s
         behind_s, since_s = belief.behind_s + interval_s, belief.since_s + interval_s
         applied = self._heat(situation.applied)
+        inexact = _inexact(belief.inexact, situation)
         given_s = belief.given_s + applied * interval_s
         bank, memory, gathered = belief.bank, belief.memory, belief.since_s > 0.0
         power = given_s / since_s if gathered else applied
@@ -185,7 +193,7 @@ class Adaptive:
         periods = math.floor(behind_s / h + 0.5)
         if periods < 1:
             return AdaptiveBelief(
-                bank, behind_s, since_s, given_s, belief.doubt, memory, belief.sds
+                bank, behind_s, since_s, given_s, belief.doubt, memory, belief.sds, inexact=inexact
             )
         for _ in range(periods - 1):
             bank, memory = trial.met(self.bank, bank, memory, math.nan, power)
@@ -196,7 +204,7 @@ class Adaptive:
         sds = self._sds(bank, memory) if due else belief.sds
         surprise_k = math.nan if gathered or periods > 1 else sign * bank.surprise_k
         behind_s -= periods * h
-        return AdaptiveBelief(bank, behind_s, 0.0, 0.0, doubt, memory, sds, surprise_k)
+        return AdaptiveBelief(bank, behind_s, 0.0, 0.0, doubt, memory, sds, surprise_k, inexact)
 
     def _sds(self, bank: BankBelief, memory: Memory) -> Sds:
         """Return how well gain and holding power are known; on trial no better than when new."""
@@ -220,7 +228,7 @@ class Adaptive:
         heat = power_for(
             outlook, r_c, self.calmness, self.period_s, bounds, before, ramp_heat, self.pace
         )
-        return belief, self._power(heat)
+        return belief, _made_up_for(self._power(heat), belief.inexact)
 
     def surprise_k(self, belief: AdaptiveBelief, situation: Situation) -> float:
         """Return reading minus what the hypotheses expected; NaN beyond one period."""
@@ -260,6 +268,25 @@ class Adaptive:
         if memory.verdict:
             remarks[memory.verdict] = memory.text
         return remarks
+
+
+def _inexact(before: float, situation: Situation) -> float:
+    """Return how much more than commanded the output gives, in the mean of half a minute."""
+    off = situation.applied - situation.commanded
+    if not abs(off) <= INEXACT:
+        return before
+    return before + (off - before) * min(situation.interval_s / INEXACT_S, 1.0)
+
+
+def _made_up_for(power: float, inexact: float) -> float:
+    """Return what to command so that the output gives `power`; none stays none.
+
+    The law knows what was given, and so what the plant will do. It would never learn that it is not
+    given what it asks for.
+    """
+    if power > 0.0:
+        return max(power - inexact, 0.0)
+    return min(power - inexact, 0.0) if power < 0.0 else power
 
 
 def _doubt(outlook: Outlook | None, plants: Plants) -> str:
