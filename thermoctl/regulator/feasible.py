@@ -49,7 +49,8 @@ DRIVEN = "plant.driven"
 FAILED = "balance.failed"
 _PRIORITY = 2
 NONE = 0.02
-"""Power below this is none."""
+"""Power below this is none. It is none as well where no more was commanded and an output gives what
+it cannot keep back: what it says it gives heats the plant no less for being known."""
 BEYOND_K = 0.5
 """What is no farther beyond the set point is regulation."""
 
@@ -121,6 +122,7 @@ class Feasibility:
         self._before = Gathered()
         self._lag_s = LAG_GUESS_S
         self._heat = 0.0  # power that has reached the sensor
+        self._asked = 0.0  # of it, what was commanded
         self._reading_c = math.nan
         self._unseen_s = 0.0
         self._slip, self._settling = Slip(), Settling()
@@ -135,7 +137,12 @@ class Feasibility:
         return self._belief
 
     def observe(
-        self, interval_s: float, applied: float, reading_c: float, lag_s: float | None
+        self,
+        interval_s: float,
+        applied: float,
+        reading_c: float,
+        lag_s: float | None,
+        beyond: float = 0.0,
     ) -> bool:
         """Gather a sample; return whether it completed a stretch.
 
@@ -149,6 +156,8 @@ class Feasibility:
             Good reading, else NaN.
         lag_s : float or None
             Lag from heater to reading, where the controller knows it.
+        beyond : float
+            By how much `applied` is more than what was commanded.
         """
         if interval_s > self._unknown_s:
             self.forget()
@@ -156,7 +165,9 @@ class Feasibility:
         if lag_s is not None and lag_s > 0.0:
             self._lag_s = lag_s
         warming = max(applied, 0.0)  # a cooler beside the heater has a gain of its own
-        self._heat += -math.expm1(-interval_s / self._lag_s) * (warming - self._heat)
+        share = -math.expm1(-interval_s / self._lag_s)
+        self._heat += share * (warming - self._heat)
+        self._asked += share * (min(warming, applied - beyond) - self._asked)
         heat, seen = self._heat, reading_c == reading_c
         if seen:
             self._reading_c = reading_c
@@ -173,7 +184,7 @@ class Feasibility:
     def forget(self) -> None:
         """Begin anew, with nothing known."""
         self._belief, self._gathered, self._before = None, Gathered(), Gathered()
-        self._heat, self.known = 0.0, Feasible()
+        self._heat, self._asked, self.known = 0.0, 0.0, Feasible()
         self._alone.clear()
 
     def fail(self, failure: Failure) -> None:
@@ -274,7 +285,7 @@ class Feasibility:
 
     def _tell(self, belief: HeatBelief, wanted: Wanted, t_s: float) -> None:
         """Raise the alarms, or clear them."""
-        full, none = self._heat >= FULL * wanted.power_max, self._heat <= NONE
+        full, none = self._heat >= FULL * wanted.power_max, self._asked <= NONE
         missing_sds = _missing_sds(belief, wanted, full)
         driven_sds = self._driven_sds(belief, wanted, none)
         for code, sds, words in (

@@ -285,7 +285,8 @@ class Regulator:
         self, interval_s: float, applied: float, temperature_c: float, lag_s: float | None
     ) -> None:
         """Keep the balance of heat."""
-        if self._feasibility.observe(interval_s, applied, temperature_c, lag_s):
+        beyond = self._applied_power() - self._command.power
+        if self._feasibility.observe(interval_s, applied, temperature_c, lag_s, beyond):
             self._feasibility.reckon(self._wanted(), self._t_s or 0.0)
 
     def _wanted(self) -> Wanted:

@@ -24,6 +24,7 @@ class Tank:
         self.water_c, self.element, self.sensor_c = water_c, 0.0, water_c
         self.t_s, self.power = 0.0, 0.0
         self.shorted = None
+        self.least = None
         self.rng = np.random.default_rng(seed)
         loop = {"setpoint_c": 80.0, "trip_above_c": 95.0, "mode": "auto", **keys}
         self.regulator = regulator_for(load({"loops": {"tank": loop}}))
@@ -43,6 +44,9 @@ class Tank:
             self.t_s += h
             step = self.regulator.step(Measurement(self.t_s, reading_c))
             self.power = step.command.power
+            if self.least is not None:
+                self.power = max(self.power, self.least)
+                self.regulator.applied(self.power)
             self.events += [each for each in step.events if each.name == UNREACHABLE]
         return step
 
@@ -185,6 +189,18 @@ def test_water_that_cools_down_to_its_set_point_or_rests_above_it_is_not_driven(
     tank.regulator.request(SetPoint(15.0))
     for _ in range(20):
         assert codes(tank.run(300)) == []
+
+
+def test_what_an_output_cannot_keep_back_drives_a_plant_though_it_says_so():
+    tank = Tank(8.0, 1500.0, 2.0, water_c=30.0, setpoint_c=37.5)
+    tank.run(1200)
+    tank.least = 0.08
+    step = tank.run(900)
+    assert step.command.power == 0.0
+    assert codes(step) == [DRIVEN]
+    assert tank.water_c < 40.5
+    tank.least = 0.0
+    assert codes(tank.run(1500)) == []
 
 
 def test_a_heater_that_cools_is_reversed_and_the_plant_not_driven():
