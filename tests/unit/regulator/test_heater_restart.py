@@ -9,8 +9,10 @@ import pytest
 
 from thermoctl.regulator.heater import memory as heater_memory
 from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.doubt import Seen
+from thermoctl.regulator.heater.known import OFF_LAGS, KnownHeater
 from thermoctl.regulator.heater.past import FirstReadings
-from thermoctl.regulator.heater.response import Gain
+from thermoctl.regulator.heater.response import LAGS_S, Gain
 from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor
@@ -158,6 +160,52 @@ def test_another_heater_than_was_remembered_is_not_condemned():
         assert abs(vessel.watch.known.mean / 0.02 - 1.0) < 0.4
 
 
+@pytest.mark.parametrize("litres", [1.1, 1.2, 1.5, 2.0, 4.0])
+@pytest.mark.parametrize("loss", [0.0012, 0.008])
+def test_a_heater_remembered_of_more_water_is_not_asked_at_rest(litres, loss):
+    vessel = Vessel(lag_s=20.0, loss=loss)
+    vessel.watch.recall(Gain(vessel.gain / litres, 0.0003, 2))
+    holds = loss / vessel.gain
+    law = lambda reading_c: min(max(holds + 0.7 * (37.5 - reading_c), 0.0), 1.0)  # noqa: E731
+    assert vessel.warm_up(2400, law=law).names() == []
+    assert abs(vessel.watch.known.mean / vessel.gain - 1.0) < 0.2
+
+
+def remembered(now_s=700.0):
+    heater = KnownHeater()
+    heater.recall(Gain(0.04, 0.0003, 1))
+    return heater, Seen(now_s, 37.5, (100.0,) * len(LAGS_S))
+
+
+def test_what_is_learnt_at_rest_does_not_replace_a_heater_of_ten_times_the_gain():
+    heater, now = remembered()
+    heater.learn(Gain(0.004, 0.0006, 0), now, 0.07, 0.01)
+    assert heater.recalled
+    assert heater.gain.mean == 0.04
+
+
+@pytest.mark.parametrize(("mean", "moved_k"), [(0.004, 0.2), (0.035, 0.07)])
+def test_what_has_moved_the_reading_or_agrees_replaces_what_was_remembered(mean, moved_k):
+    heater, now = remembered()
+    heater.learn(Gain(mean, 0.0006, 1), now, moved_k, 0.01)
+    assert heater.seen
+    assert heater.gain.mean == mean
+
+
+@pytest.mark.parametrize(("place", "proven"), [(0, False), (1, True), (2, False)])
+def test_a_lag_that_differs_from_the_one_remembered_has_yet_to_be_seen(place, proven):
+    heater, now = remembered()
+    heater.learn(Gain(0.035, 0.0006, place), now, 0.5, 0.01)
+    assert heater.proven is proven
+
+
+def test_an_answer_does_not_show_the_lag_of_a_heater_that_was_remembered():
+    heater, _ = remembered()
+    heater.accept(Gain(0.035, 0.0006, 1))
+    assert heater.seen
+    assert heater.under_way_s == OFF_LAGS * LAGS_S[-1]
+
+
 @pytest.mark.parametrize("does", [lambda power: 0.0, lambda power: -power])
 def test_a_remembered_heater_that_has_failed_is_latched(does):
     vessel = recalled(Vessel().warm_up(900))
@@ -210,6 +258,13 @@ def test_a_reading_at_rest_or_falling_says_nothing_of_heat():
     assert math.isnan(seen([37.5 + 0.005 * (n % 3) for n in range(100)]).power)
     assert math.isnan(seen([37.5 - 0.2 * n for n in range(100)]).power)
     assert math.isnan(seen([math.nan] * 100).power)
+
+
+def test_a_reading_that_turns_with_the_power_says_nothing_of_heat_from_before():
+    readings_c = [37.5 + min(0.01 * n, 0.05) for n in range(60)] + [
+        37.5 - 0.04 * n for n in range(9)
+    ]
+    assert math.isnan(seen(readings_c, powers=40 * [0.7] + 20 * [0.2] + 9 * [0.0]).power)
 
 
 @pytest.mark.parametrize("lag_s", [15.0, 20.0, 30.0])

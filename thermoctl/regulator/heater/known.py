@@ -2,7 +2,13 @@
 
 A heater may be unknown, known of an earlier run, or seen to heat in this one. What an earlier run
 knew may be of another plant: where that makes a difference, its lag is taken for the next longer
-one, and what this run learns takes its place after ten minutes.
+one, and what this run learns takes its place after ten minutes. At rest little is learnt: a
+controller that makes up for whatever comes makes it look as if heat did nothing. So what does not
+agree with what an earlier run knew has to have moved the reading before it takes its place.
+
+A reading that rises by more than full power can raise it shows that the memory is of another plant,
+of more water. Such a one would make of the loss a gain, and expect at rest what comes of nothing:
+it is forgotten, and the heater is one that nobody knows.
 
 A first warm-up at full power shows a gain, but hardly how long heat is on its way: as long as the
 power stays, a plant whose stirrer has stopped goes on as before, only later. It shows once there is
@@ -11,8 +17,9 @@ less power and the reading obeys. Until then heat may be under way for as long a
 
 from __future__ import annotations
 
-from thermoctl.regulator.heater.doubt import Seen
+from thermoctl.regulator.heater.doubt import LEAST_K, SDS, Seen
 from thermoctl.regulator.heater.response import LAGS_S, Gain
+from thermoctl.regulator.heater.trial import RISE_K, RISE_SDS
 
 SURE = 5.0
 """A gain is known from so many standard deviations on,"""
@@ -21,6 +28,8 @@ ARRIVED_LAGS, ARRIVED_S = 0.5, 10.0
 middle of a warm-up finds a reading that rises by heat of before, whatever power there is now."""
 RECALLED_S = 600.0
 """So long what an earlier run knew is better than what this one has learnt."""
+OUTDONE = 1.1
+"""So many times what full power does is mains that are high, and more is another plant."""
 NEARLY_FULL = 0.9
 """It has to show a rise only at so much power."""
 CHANGED, AT_ONCE = 0.7, 3.0
@@ -51,7 +60,7 @@ class KnownHeater:
         """Begin with a heater that nobody knows."""
         self.gain: Gain | None = None
         self.recalled = self._obeys = False
-        self._most = 0.0
+        self._most = self._outdone_k = 0.0
         self._eased: Seen | None = None  # when less power began
 
     def recall(self, gain: Gain) -> None:
@@ -74,14 +83,39 @@ class KnownHeater:
             self.forget()
         return not self.recalled
 
-    def learn(self, gain: Gain | None, now: Seen) -> None:
-        """Take `gain` for known, once it is sure."""
+    def learn(self, gain: Gain | None, now: Seen, moved_k: float, sd_k: float) -> None:
+        """Take `gain` for known, once it is sure.
+
+        Parameters
+        ----------
+        gain : Gain or None
+            What was learnt.
+        now : Seen
+            Where the plant is.
+        moved_k : float
+            How far the heat has moved the reading by which it was learnt, in K.
+        sd_k : float
+            Standard deviation of a reading.
+        """
         if gain is None or gain is self.gain or gain.mean <= SURE * gain.sd:
             return
-        if self.recalled and now.t_s < RECALLED_S:
+        if not arrived(gain, now):
             return
-        if arrived(gain, now):
-            self.gain, self.recalled = gain, False
+        if self.recalled and self.gain is not None:
+            moved = moved_k > max(RISE_K, RISE_SDS * sd_k)
+            if now.t_s < RECALLED_S or not (moved or _agree(gain, self.gain)):
+                return
+            self._obeys = gain.place == self.gain.place  # another lag has not been seen by any run
+        self.gain, self.recalled = gain, False
+
+    def outdone(self, before: Seen, now: Seen, sd_k: float) -> bool:
+        """Return whether a reading rises as no heater that is remembered could make it."""
+        gain = self.gain
+        if gain is None or not self.recalled:
+            return False
+        most_k = OUTDONE * gain.mean * (now.t_s - before.t_s)
+        self._outdone_k = max(0.0, self._outdone_k + now.reading_c - before.reading_c - most_k)
+        return self._outdone_k > max(LEAST_K, SDS * sd_k)
 
     def accept(self, shown: Gain) -> None:
         """Take for known what an answer has `shown`, if that is news."""
@@ -91,6 +125,7 @@ class KnownHeater:
             known = shown._replace(cools_per_s=cools_per_s)
         elif shown.mean > known.mean / CHANGED:
             known = known._replace(mean=min(shown.mean, AT_ONCE * known.mean))
+        self._obeys = self._obeys and not self.recalled  # an answer does not show the lag
         self.gain, self.recalled = known, False
 
     def follow(self, power: float, now: Seen) -> None:
@@ -129,3 +164,8 @@ class KnownHeater:
 def arrived(gain: Gain, now: Seen) -> bool:
     """Return whether enough heat has come by `now` to know a gain under such a lag."""
     return now.heat_s[gain.place] > max(ARRIVED_LAGS * gain.lag_s, ARRIVED_S)
+
+
+def _agree(gain: Gain, other: Gain) -> bool:
+    """Return whether both may be of one heater."""
+    return CHANGED * other.mean < gain.mean < other.mean / CHANGED

@@ -23,6 +23,8 @@ CLEAR_SDS = 10.0
 BENT = 0.7
 """From cold less than this share of what a reading rises lately, it rose at first: with a lag of a
 single block .57, with a longer one less. What goes on from before is the same at both ends."""
+MOVES = 0.05
+"""Power this close to what it was has not moved, and teaches nothing."""
 LONGEST = 75
 """After so many blocks without a clear rise it makes no difference."""
 
@@ -55,7 +57,7 @@ class FirstReadings:
         return (self._readings_c[-1] - self._readings_c[-LEAST]) / (LEAST - 1)
 
     def observe(self, power: float, reading_c: float, sd_k: float) -> None:
-        """Take in one more block, the power of which has not moved."""
+        """Take in one more block; a reading bends with a power that has moved."""
         if self._past is Past.NOTHING or math.isnan(reading_c):
             return
         readings_c = self._readings_c
@@ -63,6 +65,8 @@ class FirstReadings:
         n, k = len(readings_c), len(readings_c) // LEAST
         if n == 2:
             self._power = power  # the first block began before the first command
+        if self._past is Past.OPEN and abs(power - self._power) > MOVES:
+            self._past = Past.NOTHING
         if self._past is Past.HEAT or n < LEAST:
             return
         first_k, last_k = readings_c[k] - readings_c[0], reading_c - readings_c[-1 - k]

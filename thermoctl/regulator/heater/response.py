@@ -26,7 +26,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from thermoctl.regulator.heater.past import FirstReadings, Past
+from thermoctl.regulator.heater.past import MOVES, FirstReadings, Past
 
 Heat = tuple[float, ...]
 """Heat that has arrived under each lag, in seconds of full power."""
@@ -39,8 +39,6 @@ TREND_S = 100.0
 """Memory of the straight line."""
 MEMORY_S = 1500.0
 """Memory of the regression, in time during which power moved."""
-MOVES = 0.05
-"""Power this close to its mean teaches nothing."""
 MEAN_S = 50.0
 """Memory of that mean."""
 ALIKE = 4.0
@@ -241,6 +239,14 @@ class HeatResponse:
         for path in paths:  # no method: a call for every lag would cost more than this
             path.line += by * path.off
             path.slope += by_per_s * path.off
+
+    @property
+    def moved_k(self) -> float:
+        """How far heat has moved the reading that taught the gain, in K."""
+        if self.gain is None or not self._blocks:
+            return 0.0
+        squares = self._paths[self.gain.place].squares
+        return abs(self.gain.mean) * math.sqrt(squares / self._blocks)
 
     def _learn_anew(self) -> None:
         """Go on as if heat had come for long as it was given since the start."""

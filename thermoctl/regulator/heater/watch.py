@@ -156,15 +156,23 @@ class HeaterWatch:
             self._hear(self._cut, block, now, t_s)
             return
         if learns and (self.known is not None or now.reading_c > self._refused_c):
-            self._heater.learn(self._response.gain, now)
+            self._heater.learn(self._response.gain, now, self._response.moved_k, sd_k)
             self._heater.follow(block.power, now)
         if before is not None:
             self._follow(block, before, now)
+            if not self._response.jumped and self._heater.outdone(before, now, sd_k):
+                self._disown(now)
         if self._cut is None and not self._heater.seen:
             self._try(block, now)
         known, settled = self._heater.gain, self._t_s >= self._settled_s
         if known is not None and settled and self._cut is None and before is not None:
             self._compare(known, block, before, now, t_s)
+
+    def _disown(self, now: Seen) -> None:
+        """Go on with a heater that nobody knows: what was remembered is of another plant."""
+        self._heater.forget()
+        self._doubt, self._distrusted_k = HeatDoubt(), 0.0
+        self._trial.begin(now.t_s)
 
     def _follow(self, block: Block, before: Seen, now: Seen) -> None:
         """Follow a climb, of a heater that is known or not; ask it when it has stalled."""
