@@ -17,7 +17,7 @@ from thermoctl.quantities import clamp
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.foretold import Settling, Slip
 from thermoctl.regulator.guard import Failure
-from thermoctl.regulator.left_alone import Beyond, LeftAlone
+from thermoctl.regulator.left_alone import PATIENCE_S, Beyond, LeftAlone
 from thermoctl.regulator.supervisor import Emit
 from thermoctl.signals import Alarm, Feasible, Mode
 
@@ -35,8 +35,6 @@ REST_SHARE = 0.8
 """The last heat comes with the slowest part of the lag."""
 LAG_DOUBT = 0.4
 """Standard deviation of the time the last heat takes, as a share of it."""
-PATIENCE_S = 864_000.0
-"""What is not reached in ten days at the present rate counts as never reached."""
 UNSEEN_S = 60.0
 """What was foreseen for longer without a reading is told to nobody, and no ground for an alarm."""
 FULL = 0.95
@@ -266,22 +264,24 @@ class Feasibility:
         It leaves the set point behind, or does not come back to it: something else heats what
         should be heated, the air or an output that is stuck at too little for `heater.stuck_on`.
         The first needs no gain: what has been stuck on since before a start is all that this run
-        has seen of its heater.
+        has seen of its heater. Nor does it need one that a plant stands still where it is.
         """
         sign = -1.0 if wanted.power_cools else 1.0
         here_c, gain = sign * belief.x[heat_loss.T], sign * belief.gain
         self._alone.seen(here_c)
-        beyond = here_c - sign * wanted.setpoint_c >= BEYOND_K
+        way_k = here_c - sign * wanted.setpoint_c
         known = belief.gain_known
         reversed_ = known and gain < 0.0 and not self._alone.knows
-        if not (none and beyond) or reversed_:
+        if not (none and way_k >= BEYOND_K) or reversed_:
             self._alone.clear()
             return 0.0
         away = heat_loss.spare(belief, sign * here_c, 0.0, belief.ahead_k)
         plant = Beyond(here_c, gain, -sign * away.mean) if known else Beyond(here_c, 0.0, 0.0)
         missing = self._alone.missing(plant, self._before.span_s, math.sqrt(belief.R))
+        stays = self._alone.stays(here_c, way_k, self._before.span_s)
         leaves = known or self._alone.waited
-        return max(sign * away.mean / away.sd if leaves else 0.0, SURE_SDS * missing)
+        leaves_sds = sign * away.mean / away.sd if leaves else 0.0
+        return max(leaves_sds, SURE_SDS * missing, SURE_SDS * stays)
 
     def _tell(self, belief: HeatBelief, wanted: Wanted, t_s: float) -> None:
         """Raise the alarms, or clear them."""

@@ -5,6 +5,11 @@ loses nothing and that no power moves, and one that stands far beyond its set po
 order. What it lost before the power went, and what power did, is not learnt from what came after. A
 plant that is left alone loses a good part of that, as long as it is not colder; one that does not
 is heated by something else.
+
+Where no loss is believed, at the temperature of the air or of a heater that never had to heat,
+nothing is missing, and the plant may stand there for ever. That needs no balance to be known: one
+mean of half an hour after the other says whether it is on its way at all. A large tank that cools
+is, however slow, and sways less within half an hour than a sample does.
 """
 
 from __future__ import annotations
@@ -26,6 +31,11 @@ LEFT_K, LEFT_SDS = 0.5, 5.0
 """What is missing adds up to a doubt beyond these, in K and in standard deviations of a reading."""
 MOST = 2.0
 """It adds up to no more than so many times that: when the plant comes back, it is soon over."""
+
+PATIENCE_S = 864_000.0
+"""What is not reached in ten days at the present rate counts as never reached."""
+MEAN_S = 1800.0
+"""Mean readings over so long are compared: draughts and showers are shorter."""
 
 
 class Beyond(NamedTuple):
@@ -55,7 +65,8 @@ class LeftAlone:
     def clear(self) -> None:
         """Begin anew when there is no power the next time."""
         self._alone_s = self._missing_k = self._loss = self._gain = 0.0
-        self._from_c = self._before_c = math.nan
+        self._from_c = self._before_c = self._last_mean_c = math.nan
+        self._mean_s = self._total_cs = self._stays = 0.0
 
     def seen(self, reading_c: float) -> None:
         """Take in where the plant is; as low as it was once it may be at rest."""
@@ -96,6 +107,31 @@ class LeftAlone:
             missing_k = self._missing_k + rise_k + LOSES * self._loss_at(reading_c) * span_s
             self._missing_k = clamp(missing_k, 0.0, MOST * limit_k)
         return self._missing_k / limit_k
+
+    def stays(self, reading_c: float, way_k: float, span_s: float) -> float:
+        """Return how surely it does not come back at all; 1 is a doubt, as for `missing`.
+
+        Parameters
+        ----------
+        reading_c : float
+            The plant at the end of another `span_s` without power.
+        way_k : float
+            How far it still is from its set point, in K.
+        span_s : float
+            How long, in s.
+        """
+        if not self.waited:
+            return 0.0
+        self._mean_s += span_s
+        self._total_cs += span_s * reading_c
+        if self._mean_s >= MEAN_S:
+            mean_c = self._total_cs / self._mean_s
+            least_k = way_k * self._mean_s / PATIENCE_S
+            fell_k = self._last_mean_c - mean_c
+            if not math.isnan(fell_k):
+                self._stays = least_k / max(fell_k, least_k / MOST)
+            self._last_mean_c, self._mean_s, self._total_cs = mean_c, 0.0, 0.0
+        return self._stays
 
     def _loss_at(self, reading_c: float) -> float:
         """Return what it lost at the beginning, less in proportion where it is colder by now."""

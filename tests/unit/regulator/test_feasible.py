@@ -191,6 +191,15 @@ def test_water_that_cools_down_to_its_set_point_or_rests_above_it_is_not_driven(
         assert codes(tank.run(300)) == []
 
 
+@pytest.mark.parametrize("setpoint_c", [15.0, 20.0])
+def test_a_set_point_below_the_room_is_told_of_a_heater_that_never_had_to_heat(setpoint_c):
+    tank = Tank(2.0, 300.0, 4.0, water_c=24.0, setpoint_c=setpoint_c, period_s=2.0)
+    assert codes(tank.run(3600)) == []  # on its way still
+    step = tank.run(4 * 3600)
+    assert step.command.power == 0.0
+    assert codes(step) == [DRIVEN]
+
+
 def test_what_an_output_cannot_keep_back_drives_a_plant_though_it_says_so():
     tank = Tank(8.0, 1500.0, 2.0, water_c=30.0, setpoint_c=37.5)
     tank.run(1200)

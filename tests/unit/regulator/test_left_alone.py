@@ -1,5 +1,8 @@
 """A plant beyond its set point that gets no power comes back, or something else heats it."""
 
+import math
+
+import numpy as np
 import pytest
 
 from thermoctl.regulator.left_alone import LEFT_K, WAITS_S, Beyond, LeftAlone
@@ -63,3 +66,31 @@ def test_each_time_without_power_begins_anew():
     alone.clear()
     _, most = followed(0.0, WAITS_S, alone)
     assert most == 0.0
+
+
+def stays(reading_c, hours, setpoint_c=15.0):
+    """Return what is said of `reading_c` at each time in s, with noise, at last and at most."""
+    alone, rng = LeftAlone(), np.random.default_rng(1)
+    said = []
+    for t_s in range(0, 3600 * hours, 10):
+        here_c = reading_c(t_s) + 0.01 * rng.standard_normal()
+        alone.missing(Beyond(here_c, 0.0, 0.0), 10.0, 0.01)
+        said.append(alone.stays(here_c, here_c - setpoint_c, 10.0))
+    return said[-1], max(said)
+
+
+def test_a_plant_that_stands_in_the_air_above_its_set_point_stays_there():
+    last, _ = stays(lambda t_s: 22.0 + 8.0 * math.exp(-t_s / 1800.0), 6)
+    assert last > 1.0
+
+
+@pytest.mark.parametrize("air_c", [10.0, 24.5])
+def test_a_large_tank_that_cools_within_days_does_not_stay(air_c):
+    _, most = stays(lambda t_s: air_c + (30.0 - air_c) * math.exp(-t_s / 200_000.0), 48, 25.0)
+    assert most < 0.3
+
+
+def test_a_plant_that_begins_to_come_back_no_longer_stays():
+    last, most = stays(lambda t_s: 22.0 - max(t_s - 9000.0, 0.0) / 3600.0, 5)
+    assert most > 1.0
+    assert last < 0.3
