@@ -171,6 +171,18 @@ def test_a_heater_remembered_of_more_water_is_not_asked_at_rest(litres, loss):
     assert abs(vessel.watch.known.mean / vessel.gain - 1.0) < 0.2
 
 
+def test_a_heater_stuck_on_is_found_by_who_remembers_one_of_more_water():
+    vessel = Vessel(lag_s=20.0)
+    vessel.water_c, vessel.first, vessel.second = 37.2, 0.2, 0.2
+    vessel.watch.recall(Gain(0.6 * vessel.gain, 0.0003, 2))
+    law = lambda reading_c: min(max(0.2 + 0.7 * (37.5 - reading_c), 0.0), 1.0)  # noqa: E731
+    assert vessel.warm_up(700, law=law).names() == []
+    vessel.does = lambda _: 1.0
+    vessel.warm_up(180, law=law)
+    assert vessel.supervisor.state is State.LATCHED
+    assert vessel.names() == ["heater.stuck_on"]
+
+
 def remembered(now_s=700.0):
     heater = KnownHeater()
     heater.recall(Gain(0.04, 0.0003, 1))

@@ -6,9 +6,10 @@ one, and what this run learns takes its place after ten minutes. At rest little 
 controller that makes up for whatever comes makes it look as if heat did nothing. So what does not
 agree with what an earlier run knew has to have moved the reading before it takes its place.
 
-A reading that rises by more than full power can raise it shows that the memory is of another plant,
-of more water. Such a one would make of the loss a gain, and expect at rest what comes of nothing:
-it is forgotten, and the heater is one that nobody knows.
+A reading that full power raises by more than it can shows that the memory is of another plant, of
+more water; one that rises so without power would be of a heater stuck on. Such a memory would make
+a gain of the loss, and expect at rest what comes of nothing: it is forgotten, and the heater is one
+that nobody knows.
 
 A first warm-up at full power shows a gain, but hardly how long heat is on its way: as long as the
 power stays, a plant whose stirrer has stopped goes on as before, only later. It shows once there is
@@ -108,10 +109,11 @@ class KnownHeater:
             self._obeys = gain.place == self.gain.place  # another lag has not been seen by any run
         self.gain, self.recalled = gain, False
 
-    def outdone(self, before: Seen, now: Seen, sd_k: float) -> bool:
-        """Return whether a reading rises as no heater that is remembered could make it."""
+    def outdone(self, power: float, before: Seen, now: Seen, sd_k: float) -> bool:
+        """Return whether `power` does more than that of the heater remembered could."""
         gain = self.gain
-        if gain is None or not self.recalled:
+        if gain is None or not self.recalled or power <= NEARLY_FULL:
+            self._outdone_k = 0.0
             return False
         most_k = OUTDONE * gain.mean * (now.t_s - before.t_s)
         self._outdone_k = max(0.0, self._outdone_k + now.reading_c - before.reading_c - most_k)

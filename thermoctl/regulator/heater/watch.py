@@ -160,7 +160,8 @@ class HeaterWatch:
             self._heater.follow(block.power, now)
         if before is not None:
             self._follow(block, before, now)
-            if not self._response.jumped and self._heater.outdone(before, now, sd_k):
+            outdone = self._heater.outdone(block.power, before, now, sd_k)
+            if outdone and not self._response.jumped:
                 self._disown(now)
         if self._cut is None and not self._heater.seen:
             self._try(block, now)
