@@ -63,7 +63,7 @@ def powers(law, gain=0.036, start=37.5, heated=0):
 STORIES = [
     (Adaptive(), 0.036, 37.5, 0),
     (Adaptive(), 0.036, 30.2, 0),
-    (Adaptive(), 0.036, 34.5, 120),
+    (Adaptive(), 0.036, 32.0, 30),
     (Adaptive(), 0.4, 37.5, 0),
     (Adaptive(calmness=0.1), 0.0004, 37.5, 0),
     (Adaptive(calmness=0.1, period_s=10.0), 0.036, 37.5, 0),

@@ -117,8 +117,10 @@ class Bank:
             Drifting(),
             prior=prior,
         )
-        heated = begun._replace(path=path.at_rest(self.hypotheses, self.u_max))
-        return begun._replace(twin=Twin(heated, odds=0.0, heated=True))
+        heated = begun._replace(
+            excitation=Excitation(self.u_max), path=path.at_rest(self.hypotheses, self.u_max)
+        )
+        return begun._replace(twin=Twin(heated, 0.0, True, begun.weights, begun.weights))
 
     def observe(self, belief: BankBelief, y_c: float, applied: float) -> BankBelief:
         """Return the belief after a period of `applied` and the reading `y_c`.
@@ -170,31 +172,35 @@ class Bank:
 
     def foretold(self, belief: BankBelief, ahead: Ahead, y_c: float) -> float:
         """Return the log likelihood of `y_c`; of twins that of both, as far as likely."""
-        alone, twin = self._foretold(belief, ahead, y_c), belief.twin
+        alone, twin = self._foretold(belief, ahead, y_c, belief.weights)[0], belief.twin
         if twin is None or ahead.twin is None:
             return alone
-        other = self._foretold(twin.belief, ahead.twin, y_c)
+        other = self._foretold(twin.belief, ahead.twin, y_c, twin.belief.weights)[0]
         odds = twin.odds - self.hearing.onset_odds
         share = 1.0 / (1.0 + math.exp(-odds if twin.heated else odds))
         most = max(alone, other)
         both = (1.0 - share) * math.exp(alone - most) + share * math.exp(other - most)
         return most + math.log(both)
 
-    def _foretold(self, belief: BankBelief, ahead: Ahead, y_c: float) -> float:
-        r"""Return the log likelihood of `y_c`; 0 where nothing was foreseen, or it is NaN.
+    def _foretold(
+        self, belief: BankBelief, ahead: Ahead, y_c: float, weights: Weights
+    ) -> tuple[float, Weights]:
+        r"""Return the log likelihood of `y_c`, and what it leaves of the weights.
 
-        It is that of the hypotheses together, without a constant:
-        :math:`\ln \sum_j w_j \, S_j^{-1/2} e^{-\min(\nu_j^2/S_j,\,25)/2}`.
+        It is that of the hypotheses together, with these weights and without a constant:
+        :math:`\ln \sum_j w_j \, S_j^{-1/2} e^{-\min(\nu_j^2/S_j,\,25)/2}`. Where nothing was
+        foreseen, or `y_c` is NaN, it is 0.
         """
         block = ahead.block
         if block is None or not math.isfinite(y_c):
-            return 0.0
+            return 0.0, weights
         nu = y_c - block[Z, X]
         S = block[Z, Z] + belief.noise.believed
         nis = np.minimum(nu * nu / S, self.hearing.gate_sds**2)
-        log = belief.weights.log - 0.5 * (np.log(S) + nis)
+        log = weights.log - 0.5 * (np.log(S) + nis)
         most = float(log.max())
-        return most + math.log(float(np.exp(log - most).sum() * belief.weights.share.max()))
+        told = most + math.log(float(np.exp(log - most).sum() * weights.share.max()))
+        return told, weights.after(1.0, nis, S)
 
     def _led(self, belief: BankBelief, ahead: Ahead, after: BankBelief, y_c: float) -> BankBelief:
         """Return `after` or its twin, whichever leads, and for some time the other with it."""
@@ -202,16 +208,17 @@ class Bank:
         assert twin is not None
         assert ahead.twin is not None
         other = self._met(twin.belief, ahead.twin, y_c)
-        for_twin = self._foretold(twin.belief, ahead.twin, y_c) - self._foretold(belief, ahead, y_c)
-        for_heat = for_twin if twin.heated else -for_twin
+        alone, weights = self._foretold(belief, ahead, y_c, twin.beside)
+        told, others = self._foretold(twin.belief, ahead.twin, y_c, twin.weights)
+        for_heat = told - alone if twin.heated else alone - told
         odds = twin.odds + clamp(for_heat, -hearing.onset_most, hearing.onset_most)
         heat_leads = odds > hearing.onset_odds
         if heat_leads == twin.heated:
-            after, other = other, after
+            after, other, weights, others = other, after, others, weights
         n = after.sample
         if n >= ONSET_SAMPLES and n * self.period_s >= hearing.onset_s:
             return after._replace(twin=None)
-        return after._replace(twin=Twin(other, odds, heated=not heat_leads))
+        return after._replace(twin=Twin(other, odds, not heat_leads, others, weights))
 
     def _met(self, belief: BankBelief, ahead: Ahead, y_c: float) -> BankBelief:
         """Return the belief after `y_c`, without a twin."""

@@ -70,11 +70,17 @@ class Twin(NamedTuple):
         Natural logarithm of the odds that there was heat.
     heated : bool
         Whether it is `belief` that has it.
+    weights, beside : Weights
+        How likely the hypotheses are in `belief`, and in the one beside it, if all readings are
+        evidence: what was foreseen depends on it. Only power that moves tells of lags, and for one
+        of the two it has not.
     """
 
     belief: BankBelief
     odds: float
     heated: bool
+    weights: Weights
+    beside: Weights
 
 
 class Ahead(NamedTuple):

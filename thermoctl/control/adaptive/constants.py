@@ -154,7 +154,7 @@ class Hearing:
     onset_s : float
         So long it is open whether power was full before the first reading, or none.
     onset_odds : float
-        It was full beyond these log odds, 2.2 to 1: most plants are met at rest.
+        It was full beyond these log odds, 2.7 to 1: most plants are met at rest.
     onset_most : float
         More than this no reading adds to the odds: of the noise little is known yet.
 
@@ -174,7 +174,7 @@ class Hearing:
     suspected_sds: float = ranged(3.0, 0.1, 1e6)
     drifted_sds: float = ranged(14.0, 1.0, 1e6)
     onset_s: float = ranged(30.0, 0.0, 1e5)
-    onset_odds: float = ranged(0.8, 0.0, 100.0)
+    onset_odds: float = ranged(1.0, 0.0, 100.0)
     onset_most: float = ranged(0.6, 0.0, 100.0)
 
     def __post_init__(self) -> None:
