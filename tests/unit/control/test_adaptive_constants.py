@@ -21,7 +21,8 @@ CONSTANTS = [(table, each.name) for table in TABLES for each in fields(TABLES[ta
 class Vessel:
     """Water behind a heater of 20 s and a sensor of 8 s: warmed, drained, chilled, uncovered."""
 
-    def __init__(self, gain, period_s):
+    def __init__(self, gain, period_s, hum_k=0.0):
+        self.hum_k, self.time_s = hum_k, 0.0
         self.rng, self.gain, self.period_s = np.random.default_rng(1), gain, period_s
         self.water_c = self.sensor_c = 30.0
         self.heat, self.loss_per_s = 0.0, 4e-4
@@ -32,7 +33,9 @@ class Vessel:
             self.water_c += self.gain * self.heat - self.loss_per_s * (self.water_c - 15.0)
             self.water_c += 0.0003 * self.rng.standard_normal()
             self.sensor_c += (1 - math.exp(-1 / 8)) * (self.water_c - self.sensor_c)
-        return self.sensor_c + 0.003 * self.rng.standard_normal()
+        self.time_s += self.period_s
+        hum_k = self.hum_k * math.sin(2.0 * math.pi * self.time_s / 37.0)
+        return self.sensor_c + 0.003 * self.rng.standard_normal() + hum_k
 
     def suffer(self, sample):
         if sample in (1200, 1400):
@@ -42,9 +45,9 @@ class Vessel:
 
 
 @lru_cache
-def powers(law, gain=0.036, start=37.5, heated=0):
+def powers(law, gain=0.036, start=37.5, heated=0, hum_k=0.0):
     """Return what `law` asks for while things happen to a vessel, set point and heater."""
-    bank, vessel = law.bank, Vessel(gain, law.period_s)
+    bank, vessel = law.bank, Vessel(gain, law.period_s, hum_k)
     for _ in range(heated):
         vessel.after(1.0)
     belief, power, asked = bank.start(), float(heated > 0), []
@@ -68,9 +71,10 @@ STORIES = [
     (Adaptive(calmness=0.1), 0.0004, 37.5, 0),
     (Adaptive(calmness=0.1, period_s=10.0), 0.036, 37.5, 0),
     (Adaptive(calmness=0.1), 3.0, 37.5, 0),
+    (Adaptive(), 0.036, 37.5, 0, 0.2),
 ]
 """A rig from cold, nearly warm, and in a warm-up; a small, a vast, a coarsely sampled
-and a fierce one."""
+and a fierce one; and one with a sensor that hums."""
 
 
 @pytest.mark.slow

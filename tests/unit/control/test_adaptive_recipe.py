@@ -105,6 +105,7 @@ class PlainBank:
         self.outside, self.silent_until_s = 0, -math.inf
         self.calm, self.sums, self.disturbed = 0, [0.0, 0.0], False
         self.learnt_from_s = -math.inf
+        self.misses, self.means, self.colour, self.most = [], np.array([0.0, 0.0, 1e-3]), 0.0, 1.0
 
     def step(self, y, applied, r):
         u = min(max(applied, self.u_min), self.u_max)
@@ -140,10 +141,14 @@ class PlainBank:
             second = min((y - 2 * self.y1 + self.y2) ** 2 / 6, 9 * max(self.R_hat, 0.001))
             self.R_hat += (second - self.R_hat) * max(0.005, 1 / (self.n + 5))
         self.y1, self.y2 = y, self.y1
-        R = max(self.R_hat, 1e-5)
         self.n += 1
         likeliest = max(self.filters, key=lambda each: each.ln_w)  # the first of equals
-        nu_m = y - likeliest.x[1]
+        nu_m, tempered = y - likeliest.x[1], 1.0
+        if self.n > 20 and self.k * self.h >= 30 and abs(nu_m) < 0.5:
+            tempered = self.listen(nu_m, self.k * self.h < self.silent_until_s - 1e-6)
+        for each in self.filters:
+            each.ln_w *= tempered
+        R = max(self.R_hat, 1e-5) + 2.0 * self.colour * (self.means[2] - self.means[0] ** 2)
         if self.n - 1 >= 20 and nu_m**2 > 25 * (likeliest.P[1, 1] + R):
             self.outside += 1
         else:
@@ -174,7 +179,8 @@ class PlainBank:
                 each.inflate(nu_m, R)
             nu, S = each.correct(y, R, self.u_min, self.k * self.h > 60, e, settling)
             if heard:
-                each.ln_w -= 0.5 * e * (math.log(S) + min(nu**2 / S, 9))
+                news = (1 - self.colour) / (1 + self.colour)
+                each.ln_w -= 0.5 * e * news * (math.log(S) + min(nu**2 / S, 9))
             told.append(math.exp(-0.5 * (math.log(S) + min(nu**2 / S, 9))))
         for j, each in enumerate(self.filters if settling and not jumped else []):
             family = range(j - j % 4, j - j % 4 + 4)  # all shapes of one lag
@@ -183,6 +189,19 @@ class PlainBank:
         best = max(each.ln_w for each in self.filters)
         for each in self.filters:
             each.ln_w = max(each.ln_w - best, -30.0)
+
+    def listen(self, nu, silent):
+        limit = 3 * math.sqrt(max(self.means[2], 1e-5))
+        nu, last = min(max(nu, -limit), limit), self.misses[-1] if self.misses else 0.0
+        news = np.array([nu, nu * last, nu * nu])
+        self.means = self.means + (news - self.means) * max(1e-3, 1 / (len(self.misses) + 5))
+        self.misses.append(nu)
+        mean, product, square = self.means
+        rho = (product - mean**2) / (square - mean**2)
+        self.colour = min(max((rho - 0.4) / 0.6, 0.0), 1.0)
+        larger = 1 + 2 * self.colour * (square - mean**2) / max(self.R_hat, 1e-5)
+        before, self.most = self.most, self.most if silent else max(self.most, larger)
+        return before / self.most
 
     def drifts(self, nu, still, lag_s):
         self.calm = self.calm + 1 if still or max(self.sums) > 3 else 0

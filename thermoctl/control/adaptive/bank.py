@@ -280,22 +280,21 @@ class Bank:
 
     def _seen(self, belief: BankBelief, ahead: Ahead, y_c: float) -> Met:
         """Return what becomes of the prediction when the reading `y_c` meets it."""
-        sample, share, heard = belief.sample + 1, ahead.excitation.share, 0.0
-        weights, drifting, noise = belief.weights, belief.drifting, belief.noise.after(y_c)
-        block, surprise_k = ahead.block, math.nan
+        sample, share, hearing = belief.sample + 1, ahead.excitation.share, self.hearing
+        drifting, block, m, heard = belief.drifting, ahead.block, belief.weights.likeliest, 0.0
+        nu = math.nan if block is None else y_c - float(block[Z, X, m])
+        noise, weights = self._noise(belief, nu, y_c)
         if belief.noise.samples == 1 and self._misled(belief, block, y_c):
             belief, noise, block = belief._replace(block=None), Noise().after(y_c), None
         if block is None:
-            block = self._begun(belief, ahead, y_c)
+            block, surprise_k = self._begun(belief, ahead, y_c), math.nan
+            nu = y_c - float(block[Z, X, m])
         else:
-            surprise_k = y_c - float(weights.share.dot(block[Z, X]))
-        R, m = noise.believed, weights.likeliest
-        nu, S_m = y_c - float(block[Z, X, m]), float(block[Z, Z, m]) + R
+            surprise_k = y_c - float(belief.weights.share.dot(block[Z, X]))
+        S_m = float(block[Z, Z, m]) + (R := noise.believed)
         lag = float(self.hypotheses.lag_s[m]) / self.period_s
-        hearing = self.hearing
-        hold, gate_sds = hearing.hold_lags * lag, hearing.gate_sds
-        outside = belief.noise.samples >= GATE_SAMPLES and nu * nu > gate_sds * gate_sds * S_m
-        gate = belief.gate.beyond(sample, hold) if outside else belief.gate.within()
+        hold = hearing.hold_lags * lag
+        gate = self._gated(belief, nu, S_m, hold)
         if gate.outlier:
             return Met(noise, gate, weights, drifting, heard, surprise_k, block)
         if sample >= drifting.silent_until:
@@ -314,11 +313,35 @@ class Bank:
             filters.grown(block, block[T, X] - water_c, self.constants)
         filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
         silent_until = max(EVIDENCE_FROM, gate.silent_until, drifting.silent_until)
-        if share > 0.0 and sample >= silent_until and not drifting.suspected:
-            weights, heard = weights.after(share, nis, S), share
+        if share > 0.0 and sample >= silent_until and not noise.stands and not drifting.suspected:
+            heard = share * noise.colour.news
+            weights = weights.after(heard, nis, S)
         elif sample < gate.silent_until and not gate.jumped:
             weights = weights.among_shapes(nis, S)
         return Met(noise, gate, weights, drifting, heard, surprise_k, block)
+
+    def _gated(self, belief: BankBelief, nu: float, S_m: float, hold: float) -> Gate:
+        """Return the gate after a reading that the likeliest missed by `nu`."""
+        if belief.noise.samples >= GATE_SAMPLES and nu * nu > self.hearing.gate_sds**2 * S_m:
+            return belief.gate.beyond(belief.sample + 1, hold)
+        return belief.gate.within()
+
+    def _noise(self, belief: BankBelief, nu: float, y_c: float) -> tuple[Noise, Weights]:
+        """Return the noise after `y_c`, which the likeliest missed by `nu`, and the weights.
+
+        Where what is not white makes it larger than it was ever taken for, all evidence was too
+        strong by the same factor. Not at a jump, after which no lag gains or loses anything.
+        """
+        before, sample = belief.noise, belief.sample + 1
+        if sample * self.period_s < self.hearing.onset_s:
+            nu = math.nan  # it may be heat from before the first reading
+        noise = before.after(y_c, nu, self.hearing)
+        most = before.colour.most
+        if noise.colour.most == most:
+            return noise, belief.weights
+        if sample < belief.gate.silent_until:
+            return noise._replace(colour=noise.colour._replace(most=most)), belief.weights
+        return noise, belief.weights.tempered(most / noise.colour.most)
 
 
 def _arrivals(hypotheses: Hypotheses, plants: Plants) -> Mapping[int, Array]:

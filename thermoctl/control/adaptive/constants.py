@@ -151,6 +151,18 @@ class Hearing:
         Sums of innovations beyond the first: power that moves is no evidence. Beyond the second:
         the loss has changed. White ones are beyond 3 for 6 % of the time, and reach 14 three times
         in ten million samples: about once in 40 days without a move of the power.
+    noise_most_k : float
+        What misses by more is no noise, and what moves by more is no step of the readings: it is
+        the plant, unlike what is believed of it. Eight bits of 100 K are .39 K.
+    white : float
+        Noise is white as long as an innovation goes over into the next one by no more than this
+        share. With .3 a plant that is unlike any hypothesis, such as a lab of 4 g, is taken for a
+        hum, and with .5 a hum is taken for a plant.
+    colour_times : float
+        The rest counts so many times as noise: innovations are what the filters have left of it.
+    colour_samples : float
+        For so many samples it is kept. A sensor hums for as long as it is there; with 200, ice that
+        melts was taken for it, and found three times as late.
     onset_s : float
         So long it is open whether power was full before the first reading, or none.
     onset_odds : float
@@ -173,6 +185,10 @@ class Hearing:
     quiet_power: float = ranged(0.15, 0.0, 1.0)
     suspected_sds: float = ranged(3.0, 0.1, 1e6)
     drifted_sds: float = ranged(14.0, 1.0, 1e6)
+    noise_most_k: float = ranged(0.5, 1e-3, 100.0)
+    white: float = ranged(0.4, 0.0, 0.99)
+    colour_times: float = ranged(2.0, 0.0, 100.0)
+    colour_samples: float = ranged(1000.0, 10.0, 1e7)
     onset_s: float = ranged(30.0, 0.0, 1e5)
     onset_odds: float = ranged(1.0, 0.0, 100.0)
     onset_most: float = ranged(0.6, 0.0, 100.0)

@@ -10,11 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from thermoctl.control.adaptive.colour import WHITE, Colour
 from thermoctl.control.adaptive.constants import Hearing
 from thermoctl.control.adaptive.hypotheses import SHAPES, Hypotheses
 from thermoctl.quantities import Array, clamp
 
 USUAL = Hearing()
+GATE_SAMPLES = 20
+"""So many valid samples come before the gate closes: they show what is likely."""
 
 # -- noise ----------------------------------------------------------------------------------------
 
@@ -24,10 +27,16 @@ NOISE_MIN_K2 = 1e-5
 _SPREAD = 6.0  # variance of y - 2 y1 + y2 in units of the noise's: 1 + 4 + 1
 _MOST = 9.0  # a second difference counts as three standard deviations at most
 _MEMORY = 0.005  # of 200 samples
+_ROUNDED = 12.0  # the square of a step over the variance of what is rounded to it
 
 
 class Noise(NamedTuple):
     """Variance of the readings, from their second differences: warming is not noise.
+
+    Where readings come in steps there may be no second difference at all, and no noise either for
+    who looks at them alone. So a reading that repeats shows that they do, and that none is known
+    to better than the least step there was between two of them. Readings that are finer than their
+    noise never repeat, or else the least step is soon far below the noise.
 
     Parameters
     ----------
@@ -37,26 +46,65 @@ class Noise(NamedTuple):
         The valid readings before.
     samples : int
         How many readings were valid.
+    step_k : float
+        The least difference between a reading and the one before, of those that differed.
+    repeats : bool
+        Whether a reading was ever the same as the one before: they come in steps.
+    least : float
+        The least variance that is believed, in K^2: that of rounding to such steps.
+    colour : Colour
+        What of the noise is not white.
     """
 
     variance: float = NOISE_START_K2
     last_c: float = math.nan
     before_last_c: float = math.nan
     samples: int = 0
+    step_k: float = math.inf
+    repeats: bool = False
+    least: float = NOISE_MIN_K2
+    colour: Colour = WHITE
 
-    def after(self, y_c: float) -> Noise:
-        """Return the noise after the valid reading `y_c`."""
-        variance, last_c, before_last_c, n = self
+    def after(self, y_c: float, nu: float = math.nan, hearing: Hearing = USUAL) -> Noise:
+        """Return the noise after the valid reading `y_c`.
+
+        Parameters
+        ----------
+        y_c : float
+            The reading in degC.
+        nu : float
+            By how much the likeliest hypothesis missed it; NaN where that says nothing of noise.
+        hearing : Hearing
+            What is taken for white.
+        """
+        variance, last_c, before_last_c, n, step_k, repeats, least, colour = self
         if n >= 2:
             second = y_c - 2.0 * last_c + before_last_c
             square = min(second * second / _SPREAD, _MOST * max(variance, NOISE_START_K2))
             variance += (square - variance) * max(_MEMORY, 1.0 / (n + 5.0))
-        return Noise(variance, y_c, last_c, n + 1)
+        moved_k = abs(y_c - last_c)
+        if moved_k == 0.0:
+            repeats = True
+        elif moved_k < step_k:
+            step_k = moved_k
+        if repeats and step_k < hearing.noise_most_k:
+            least = max(step_k * step_k / _ROUNDED, NOISE_MIN_K2)
+        if n >= GATE_SAMPLES and abs(nu) < hearing.noise_most_k:
+            colour = colour.after(nu, variance, hearing)
+        return Noise(variance, y_c, last_c, n + 1, step_k, repeats, least, colour)
+
+    @property
+    def stands(self) -> bool:
+        """Whether readings have repeated and never differed.
+
+        They say nothing then: a reading that has not left its step is not at rest.
+        """
+        return self.repeats and self.step_k == math.inf
 
     @property
     def believed(self) -> float:
         """The variance that filters are told, R of their equations."""
-        return max(self.variance, NOISE_MIN_K2)
+        return max(self.variance, self.least) + self.colour.variance
 
 
 UNHEARD = Noise()
@@ -101,8 +149,6 @@ def forgetting(hypotheses: Hypotheses, hearing: Hearing) -> Array:
 
 # -- outliers and jumps ---------------------------------------------------------------------------
 
-GATE_SAMPLES = 20
-"""So many valid samples come before the gate closes: they show what is likely."""
 OUTLIERS = 2
 """So many samples outside in a row are nobody's; one more, and the water has jumped."""
 
@@ -237,6 +283,10 @@ class Weights(NamedTuple):
         log = _likelihood(nis, S, e)
         log += self.log  # ALF (6)-(7), in logarithms
         return weighted(log)
+
+    def tempered(self, factor: float) -> Weights:
+        """Return the weights had all evidence counted `factor` of what it did."""
+        return weighted(factor * self.log)
 
     def among_shapes(self, nis: Array, S: Array) -> Weights:
         """Return the weights after innovations that speak of shapes alone.
