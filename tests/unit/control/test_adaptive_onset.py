@@ -80,7 +80,7 @@ def test_so_do_23_of_24_restarts_with_what_the_first_start_learnt():
     passed_k = [
         restarted(LAW, 20, seed, after_s, model) for seed in range(8) for after_s in (100, 200, 250)
     ]
-    assert np.sum(np.array(passed_k) > 0.1) <= 1  # .43 K: the odds were .86 when time was up
+    assert np.sum(np.array(passed_k) > 0.1) <= 1  # .43 K: odds between .85 and .9 when time was up
     assert np.mean(passed_k) < 0.06
 
 

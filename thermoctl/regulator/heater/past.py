@@ -65,7 +65,7 @@ class FirstReadings:
         n, k = len(readings_c), len(readings_c) // LEAST
         if n == 2:
             self._power = power  # the first block began before the first command
-        if self._past is Past.OPEN and abs(power - self._power) > MOVES:
+        if self._past is Past.OPEN and n > LEAST and abs(power - self._power) > MOVES:
             self._past = Past.NOTHING
         if self._past is Past.HEAT or n < LEAST:
             return
