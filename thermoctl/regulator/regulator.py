@@ -198,7 +198,7 @@ class Regulator:
         """Return what is made of `measurement`; never raises, whatever it holds."""
         t_s, interval_s = self._time(measurement.t_s)
         load = self._load.mean(t_s, interval_s)
-        applied, commanded = self._applied_power() - load, self._command.power - load
+        applied, commanded = self._applied_power() - load, self._commanded_power() - load
         verdict = self._supervisor.judge(measurement, t_s, interval_s, self._jump_k)
         temperature_c = float(measurement.temperature_c) if verdict is Verdict.GOOD else math.nan
         self._learning.observe(temperature_c, self._given(applied, interval_s), t_s)
@@ -255,6 +255,13 @@ class Regulator:
 
     def _applied_power(self) -> float:
         return self._command.power if self._applied is None else self._applied
+
+    def _commanded_power(self) -> float:
+        """Return the power that was commanded; NaN where whoever follows may be off by any share.
+
+        It is another loop then, which takes its time, and nothing to be made up for.
+        """
+        return self._command.power if self._limits.applied_tolerance < 1.0 else math.nan
 
     def _given(self, applied: float, interval_s: float) -> float:
         """Return the heat given since the last sample, in power times nominal periods.

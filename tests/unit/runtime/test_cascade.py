@@ -165,3 +165,8 @@ def test_a_block_that_fails_leaves_the_bath_running_and_nothing_wound_up():
     assert bench.block.accepted_power == 0.0
     assert bench.bath.step.state is State.RUN
     assert bench.bath.accepted_power < 0.7  # it is told that the block goes cold
+
+
+def test_a_loop_that_leads_makes_up_for_nothing_that_the_other_is_behind():
+    bench = Bench().run(60)
+    assert bench.regulator("bath")._steering.mind.belief.inexact == 0.0

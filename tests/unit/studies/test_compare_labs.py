@@ -14,6 +14,7 @@ from thermoctl.model.sensor import TMP36
 from thermoctl.plant import lab
 from thermoctl.plant.acquisition import Acquisition
 from thermoctl.plant.lab import LabHeat, LabParameters, TemperatureLab
+from thermoctl.regulator.heater.check import HeaterCheck, weakest_of
 from thermoctl.studies.compare.bounds import bounds
 from thermoctl.studies.compare.labs import KnownLab, lab_rest, linear_lab
 from thermoctl.studies.compare.linear import reading_variance
@@ -201,10 +202,10 @@ def test_a_lab_is_given_the_limits_and_the_gain_of_its_data_sheet():
     assert rig.limits.trip_above_c == TABLE.trip_above_c
 
 
-def test_the_heater_of_a_lab_is_checked_as_that_of_a_rig():
+def test_the_heater_of_a_lab_is_checked_as_that_of_a_rig_by_what_it_is_rated():
     law = contender("on-off", TABLE)
-    checks = [law.plan_for(plant(fleet, 3)).heater_check for fleet in ("tclab", "rig")]
-    assert checks[0] == checks[1] is not None
+    for fleet, heater_w in (("tclab", 1.0), ("rig", TABLE.heater_w)):
+        assert law.plan_for(plant(fleet, 3)).heater_check == HeaterCheck(weakest_of(heater_w))
 
 
 def test_a_lab_has_settled_within_its_own_band_in_runs_and_in_bounds():
