@@ -25,6 +25,9 @@ BENT = 0.7
 single block .57, with a longer one less. What goes on from before is the same at both ends."""
 MOVES = 0.05
 """Power this close to what it was has not moved, and teaches nothing."""
+BEGINS = 15
+"""So many blocks a rise may take to be clear, whatever the power does: a law that sees heat
+of before brakes at once."""
 LONGEST = 75
 """After so many blocks without a clear rise it makes no difference."""
 
@@ -65,7 +68,7 @@ class FirstReadings:
         n, k = len(readings_c), len(readings_c) // LEAST
         if n == 2:
             self._power = power  # the first block began before the first command
-        if self._past is Past.OPEN and n > LEAST and abs(power - self._power) > MOVES:
+        if self._past is Past.OPEN and n > BEGINS and abs(power - self._power) > MOVES:
             self._past = Past.NOTHING
         if self._past is Past.HEAT or n < LEAST:
             return
