@@ -177,7 +177,7 @@ class Bank:
             return alone
         other = self._foretold(twin.belief, ahead.twin, y_c, twin.belief.weights)[0]
         odds = twin.odds - self.hearing.onset_odds
-        share = 1.0 / (1.0 + math.exp(-odds if twin.heated else odds))
+        share = 0.5 * (1.0 + math.tanh(0.5 * (odds if twin.heated else -odds)))
         most = max(alone, other)
         both = (1.0 - share) * math.exp(alone - most) + share * math.exp(other - most)
         return most + math.log(both)
