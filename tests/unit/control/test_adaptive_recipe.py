@@ -24,6 +24,8 @@ class Filter:
     ln_w: float = 0.0
     x: np.ndarray = field(default_factory=lambda: np.zeros(4))
     P: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
+    K: np.ndarray = field(default_factory=lambda: np.zeros(4))
+    S: float = 0.0
 
     def __post_init__(self):
         pipe = self.shape is None  # and what is beyond heater and sensor, 20 s of both, is dead
@@ -44,7 +46,10 @@ class Filter:
         self.q = u + decay * (before - u)
         self.q_mean = u + self.t1_s * (1.0 - decay) * (before - u) / self.h  # integral over h
 
-    def predict(self, away, t_s):
+    def arrives(self, t_s):
+        return t_s - self.h <= 2 * self.lag_s < t_s
+
+    def predict(self, away, t_s, steady):
         a = 1.0 - math.exp(-self.h / self.t2_s)
         c = self.h - self.t2_s * a  # of water that warms by 1 K/s, shown at the end of h
         F = np.array([[1, 0, -self.h, self.h * self.q_mean], [a, 1 - a, -c, c * self.q_mean],
@@ -55,8 +60,10 @@ class Filter:
         before = self.x[0]
         self.x = F @ self.x
         self.grow(self.x[0] - before)
+        if steady:
+            return
         self.P = F @ self.P @ F.T + self.h * np.diag(noise)
-        if t_s - self.h <= 2 * self.lag_s < t_s:
+        if self.arrives(t_s):
             ridge = np.array([0, 0, 1, 1]) * 0.08 * self.x[3] * self.q
             self.P = self.P + np.outer(ridge, ridge)
 
@@ -68,16 +75,20 @@ class Filter:
         D = np.diag([root, root, 1.0, 1.0])
         self.P = D @ self.P @ D
 
-    def correct(self, y, R, u_min, limit_loss, e, settling):
-        S, nu = self.P[1, 1] + R, y - self.x[1]
-        K = self.P[:, 1] / S
-        K[3] *= e if self.P[3, 3] <= (0.1 * self.x[3]) ** 2 else 1.0
+    def correct(self, y, R, u_min, limit_loss, e, settling, steady):
+        nu = y - self.x[1]
+        if not steady:
+            self.S = self.P[1, 1] + R
+            self.K = self.P[:, 1] / self.S
+            self.K[3] *= e if self.P[3, 3] <= (0.1 * self.x[3]) ** 2 else 1.0
+        S, K = self.S, self.K
         self.x = self.x + K * nu
         if settling:
             self.grow(K[0] * nu)
-        A = np.eye(4) - np.outer(K, [0, 1, 0, 0])
-        self.P = A @ self.P @ A.T + R * np.outer(K, K)
-        self.P = (self.P + self.P.T) / 2
+        if not steady:
+            A = np.eye(4) - np.outer(K, [0, 1, 0, 0])
+            self.P = A @ self.P @ A.T + R * np.outer(K, K)
+            self.P = (self.P + self.P.T) / 2
         self.x[3] = min(max(self.x[3], 2e-5), 60.0 / self.lag_s)
         if limit_loss:
             self.x[2] = min(max(self.x[2], (u_min - 0.5) * self.x[3]), 0.95 * self.x[3])
@@ -106,6 +117,7 @@ class PlainBank:
         self.calm, self.sums, self.disturbed = 0, [0.0, 0.0], False
         self.learnt_from_s = -math.inf
         self.misses, self.means, self.colour, self.most = [], np.array([0.0, 0.0, 1e-3]), 0.0, 1.0
+        self.bound, self.settled, self.kept = None, False, 0  # K S of the loss, and its standing
 
     def step(self, y, applied, r):
         u = min(max(applied, self.u_min), self.u_max)
@@ -127,16 +139,19 @@ class PlainBank:
                 each.begin(y)
         self.k += 1
         away = abs(u - self.told[0]) if self.k > 0 else 0.0
+        self.steady = self.settled and self.kept < 9 and e == 0 and away < 0.15
+        self.steady &= not any(each.arrives(self.k * self.h) for each in self.filters)
         for each in self.filters:
-            each.predict(away, self.k * self.h)
+            each.predict(away, self.k * self.h, self.steady)
         w = np.exp([each.ln_w for each in self.filters])
         expected = w @ [each.x[1] for each in self.filters] / w.sum()
         self.surprise = y - expected if self.k > 0 else math.nan
+        before, self.bound, self.settled = self.bound, None, False
         if valid:
-            self.meet(y, e, away)
+            self.meet(y, e, away, before)
         return self.decide(r)
 
-    def meet(self, y, e, away):
+    def meet(self, y, e, away, bound):
         if self.n >= 2:
             second = min((y - 2 * self.y1 + self.y2) ** 2 / 6, 9 * max(self.R_hat, 0.001))
             self.R_hat += (second - self.R_hat) * max(0.005, 1 / (self.n + 5))
@@ -149,7 +164,8 @@ class PlainBank:
         for each in self.filters:
             each.ln_w *= tempered
         R = max(self.R_hat, 1e-5) + 2.0 * self.colour * (self.means[2] - self.means[0] ** 2)
-        if self.n - 1 >= 20 and nu_m**2 > 25 * (likeliest.P[1, 1] + R):
+        S_m = likeliest.S if self.steady else likeliest.P[1, 1] + R
+        if self.n - 1 >= 20 and nu_m**2 > 25 * S_m:
             self.outside += 1
         else:
             self.outside = 0
@@ -158,7 +174,7 @@ class PlainBank:
         jumped = self.outside > 2
         found = False
         if self.k * self.h >= self.learnt_from_s - 1e-6:
-            nu = nu_m / math.sqrt(likeliest.P[1, 1] + R)
+            nu = nu_m / math.sqrt(S_m)
             found = self.drifts(nu, e == 0 and away < 0.15, likeliest.lag_s)
         if found and not jumped:
             for each in self.filters:
@@ -169,6 +185,7 @@ class PlainBank:
         if jumped or found:
             self.calm, self.sums, self.disturbed = 0, [0.0, 0.0], True
             self.learnt_from_s = self.k * self.h + 5 * likeliest.lag_s
+        self.steady &= not (jumped or found)
         heard = not jumped and self.k >= 4 and max(self.sums) <= 3
         heard &= self.k * self.h >= max(self.silent_until_s, self.learnt_from_s)
         settling = self.k * self.h < self.silent_until_s
@@ -177,7 +194,8 @@ class PlainBank:
         for each in self.filters:
             if jumped:
                 each.inflate(nu_m, R)
-            nu, S = each.correct(y, R, self.u_min, self.k * self.h > 60, e, settling)
+            limited = self.k * self.h > 60
+            nu, S = each.correct(y, R, self.u_min, limited, e, settling, self.steady)
             if heard:
                 news = (1 - self.colour) / (1 + self.colour)
                 each.ln_w -= 0.5 * e * news * (math.log(S) + min(nu**2 / S, 9))
@@ -189,6 +207,19 @@ class PlainBank:
         best = max(each.ln_w for each in self.filters)
         for each in self.filters:
             each.ln_w = max(each.ln_w - best, -30.0)
+        from_s = max(4 * self.h, self.silent_until_s, self.learnt_from_s) - 1e-6
+        quiet = e == 0 and away < 0.15 and not self.disturbed and self.k * self.h >= from_s
+        self.settle(quiet, self.filters.index(likeliest), bound)
+
+    def settle(self, quiet, m, before):
+        """Keep the gains of a plant at rest for nine samples, where they have come to stand."""
+        if self.steady:
+            self.bound, self.kept, self.settled = before, self.kept + 1, True
+            return
+        now = [each.K[2] * each.S for each in self.filters]
+        self.bound, self.kept = now if quiet else before, 0
+        compared = quiet and before is not None
+        self.settled = compared and abs(now[m] - before[m]) <= 0.01 * abs(now[m])
 
     def listen(self, nu, silent):
         limit = 3 * math.sqrt(max(self.means[2], 1e-5))

@@ -30,6 +30,7 @@ from thermoctl.control.adaptive.evidence import (
     Weights,
 )
 from thermoctl.control.adaptive.filters import T, X, Z
+from thermoctl.control.adaptive.gains import Gains, reckoned
 from thermoctl.control.adaptive.hypotheses import Hypotheses
 from thermoctl.control.adaptive.path import Path
 from thermoctl.quantities import Array, clamp, is_finite_number
@@ -71,7 +72,6 @@ class Bank:
     hypotheses: Hypotheses = field(init=False, repr=False)
     constants: filters.PerPeriod = field(init=False, repr=False)
     _arrivals: Mapping[int, Array] = field(init=False, repr=False)
-    _forgetting: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("u_min", "u_max"):
@@ -86,7 +86,6 @@ class Bank:
         object.__setattr__(self, "hypotheses", hypotheses)
         object.__setattr__(self, "constants", constants)
         object.__setattr__(self, "_arrivals", _arrivals(hypotheses, self.plants))
-        object.__setattr__(self, "_forgetting", evidence.forgetting(hypotheses, self.hearing))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -149,15 +148,30 @@ class Bank:
         if outlook is None:
             memory_s = unrest = 0.0
         else:
-            memory_s = 1.0 / float(belief.weights.share.dot(self._forgetting))
+            # Rates are averaged: with a short lag as likely as a long one it is a short time.
+            memory_s = self.hearing.memory_lags * outlook.lag_harmonic_s
             unrest = abs(power - outlook.holding_power)
         excitation = belief.excitation.after(power, self.period_s, memory_s, self.hearing)
-        if block is not None and belief.blind * self.period_s <= BLIND_S:
+        gains = None
+        if block is None or belief.blind * self.period_s > BLIND_S:
+            block = None
+        elif (gains := self._kept(belief, excitation, unrest)) is None:
             block = self._predicted(block, way, belief.sample + 1, unrest)
         else:
-            block = None
+            block = filters.moved(block, way.mean, self.constants)
         twin = None if belief.twin is None else self.ahead(belief.twin.belief, applied)
-        return Ahead(excitation, way, unrest, block, twin)
+        return Ahead(excitation, way, unrest, block, gains, twin)
+
+    def _kept(self, belief: BankBelief, excitation: Excitation, unrest: float) -> Gains | None:
+        """Return the gains if they can be kept for one more sample; None if they cannot."""
+        gains = belief.gains
+        if gains is None or not gains.lasting or not self._still(excitation.share, unrest):
+            return None
+        return None if belief.sample + 1 in self._arrivals else gains
+
+    def _still(self, share: float, unrest: float) -> bool:
+        """Return whether the power is steady, and about what holds the water."""
+        return share == 0.0 and unrest < self.hearing.quiet_power
 
     def met(self, belief: BankBelief, ahead: Ahead, y_c: float) -> BankBelief:
         """Return the belief after the reading `y_c` at the end of the period `ahead`.
@@ -195,7 +209,7 @@ class Bank:
         if block is None or not math.isfinite(y_c):
             return 0.0, weights
         nu = y_c - block[Z, X]
-        S = block[Z, Z] + belief.noise.believed
+        S = block[Z, Z] + belief.noise.believed if ahead.gains is None else ahead.gains.S
         nis = np.minimum(nu * nu / S, self.hearing.gate_sds**2)
         log = weights.log - 0.5 * (np.log(S) + nis)
         most = float(log.max())
@@ -226,7 +240,10 @@ class Bank:
         if belief.block is None and not seen:
             return belief._replace(path=way, excitation=ahead.excitation)
         met = self._seen(belief, ahead, y_c) if seen else self._unseen(belief, ahead)
-        view = outlook(met.block, way, met.weights.share, self.hypotheses, self.constants)
+        gains, weights = met.gains, met.weights
+        same = gains is not None and gains.age > 0 and weights is belief.weights
+        before = belief.outlook if same else None
+        view = outlook(met.block, way, weights.share, self.hypotheses, self.constants, before)
         if not math.isfinite(np.vdot(met.block, met.block) + view.coasting_c):
             raise ArithmeticError(f"expected a finite belief after {y_c!r} degC")
         for array in (met.block, *way):
@@ -238,7 +255,7 @@ class Bank:
         """Return the belief after a gap of which the applied power is not known."""
         blind = max(belief.blind, math.ceil(BLIND_S / self.period_s)) + 1
         way = path.at_rest(self.hypotheses)
-        return belief._replace(blind=blind, gate=Gate(), path=way, twin=None)
+        return belief._replace(blind=blind, gate=Gate(), path=way, gains=None, twin=None)
 
     def _predicted(
         self, block: filters.Block, way: Path, sample: int, unrest: float
@@ -281,44 +298,60 @@ class Bank:
     def _seen(self, belief: BankBelief, ahead: Ahead, y_c: float) -> Met:
         """Return what becomes of the prediction when the reading `y_c` meets it."""
         sample, share, hearing = belief.sample + 1, ahead.excitation.share, self.hearing
-        drifting, block, m, heard = belief.drifting, ahead.block, belief.weights.likeliest, 0.0
-        nu = math.nan if block is None else y_c - float(block[Z, X, m])
+        drifting, block, m = belief.drifting, ahead.block, belief.weights.likeliest
+        nu = math.nan if block is None else y_c - block.item(Z, X, m)
         noise, weights = self._noise(belief, nu, y_c)
         if belief.noise.samples == 1 and self._misled(belief, block, y_c):
             belief, noise, block = belief._replace(block=None), Noise().after(y_c), None
         if block is None:
             block, surprise_k = self._begun(belief, ahead, y_c), math.nan
-            nu = y_c - float(block[Z, X, m])
+            nu = y_c - block.item(Z, X, m)
         else:
             surprise_k = y_c - float(belief.weights.share.dot(block[Z, X]))
-        S_m = float(block[Z, Z, m]) + (R := noise.believed)
-        lag = float(self.hypotheses.lag_s[m]) / self.period_s
-        hold = hearing.hold_lags * lag
-        gate = self._gated(belief, nu, S_m, hold)
+        gains, still = ahead.gains, self._still(share, ahead.unrest)
+        S_m = block.item(Z, Z, m) + noise.believed if gains is None else gains.S.item(m)
+        lag = self.hypotheses.lag_s.item(m) / self.period_s
+        gate = self._gated(belief, nu, S_m, hearing.hold_lags * lag)
         if gate.outlier:
-            return Met(noise, gate, weights, drifting, heard, surprise_k, block)
+            return Met(noise, gate, weights, drifting, 0.0, surprise_k, block)
         if sample >= drifting.silent_until:
-            still = share == 0.0 and ahead.unrest < hearing.quiet_power
             rest = max(hearing.quiet_lags * lag, QUIET_SAMPLES)
             drifting = drifting.after(still, nu / math.sqrt(S_m), rest, hearing)
-        if gate.jumped:
-            block = filters.inflated(block, nu, R)
-            drifting = Drifting(silent_until=gate.silent_until, disturbed=True)
-        elif drifting.found:
-            block = filters.reopened(block, self.plants)
-            drifting = Drifting(silent_until=sample + hold, disturbed=True)
-        water_c = block[T, X]
-        block, nis, S = filters.corrected(block, y_c, R, self.constants, share)
-        if sample < gate.silent_until:  # what was poured in is colder, and loses less
-            filters.grown(block, block[T, X] - water_c, self.constants)
-        filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
+        if gate.jumped or drifting.found:
+            R, gains = noise.believed, None
+            block, drifting = self._disturbed(block, gate, nu, R, sample, lag)
+        if gains is not None:
+            block = filters.followed(block, y_c, gains.K)
+            filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
+            return Met(noise, gate, weights, drifting, 0.0, surprise_k, block, gains.kept())
         silent_until = max(EVIDENCE_FROM, gate.silent_until, drifting.silent_until)
-        if share > 0.0 and sample >= silent_until and not noise.stands and not drifting.suspected:
+        heard, before = 0.0, block
+        block, nis, S = filters.corrected(before, y_c, noise.believed, self.constants, share)
+        if sample < gate.silent_until:  # what was poured in is colder, and loses less
+            filters.grown(block, block[T, X] - before[T, X], self.constants)
+        filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
+        if still and sample >= silent_until and not drifting.disturbed:
+            K = filters.gains_at_rest(before, S, self.constants)
+            gains = reckoned(belief.gains, K, S, m)
+        elif belief.gains is not None:
+            gains = belief.gains.unsettled()
+        if share > 0.0 and sample >= silent_until and not (noise.stands or drifting.suspected):
             heard = share * noise.colour.news
             weights = weights.after(heard, nis, S)
         elif sample < gate.silent_until and not gate.jumped:
             weights = weights.among_shapes(nis, S)
-        return Met(noise, gate, weights, drifting, heard, surprise_k, block)
+        return Met(noise, gate, weights, drifting, heard, surprise_k, block, gains)
+
+    def _disturbed(
+        self, block: filters.Block, gate: Gate, nu: float, R: float, sample: int, lag: float
+    ) -> tuple[filters.Block, Drifting]:
+        """Return the block, and how it is heard, of water that has jumped or that drifts."""
+        if gate.jumped:
+            block, silent_until = filters.inflated(block, nu, R), gate.silent_until
+        else:
+            block = filters.reopened(block, self.plants)
+            silent_until = sample + self.hearing.hold_lags * lag
+        return block, Drifting(silent_until=silent_until, disturbed=True)
 
     def _gated(self, belief: BankBelief, nu: float, S_m: float, hold: float) -> Gate:
         """Return the gate after a reading that the likeliest missed by `nu`."""

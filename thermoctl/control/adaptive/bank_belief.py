@@ -8,6 +8,7 @@ from typing import NamedTuple
 from thermoctl.control.adaptive import filters
 from thermoctl.control.adaptive.coasting import Outlook
 from thermoctl.control.adaptive.evidence import Drifting, Excitation, Gate, Noise, Weights
+from thermoctl.control.adaptive.gains import Gains
 from thermoctl.control.adaptive.path import Path
 
 
@@ -35,6 +36,8 @@ class BankBelief(NamedTuple):
         where there was no reading, or nothing to expect.
     block : ndarray, shape (4, 5, n) or None
         The filters; None before the first valid reading.
+    gains : Gains or None
+        Those of the filters after a sample of rest; None after any other.
     outlook : Outlook or None
         What follows for control; None before the first valid reading.
     prior : Prior
@@ -54,6 +57,7 @@ class BankBelief(NamedTuple):
     heard: float = 0.0
     surprise_k: float = math.nan
     block: filters.Block | None = None
+    gains: Gains | None = None
     outlook: Outlook | None = None
     prior: filters.Prior = filters.UNKNOWN
     twin: Twin | None = None
@@ -94,6 +98,8 @@ class Ahead(NamedTuple):
         How far the power was from what holds the water; 0 while that is not known.
     block : ndarray, shape (4, 5, n) or None
         The filters; None where nothing is foreseen, at the start or after a long gap.
+    gains : Gains or None
+        Those that are kept; then P is what it was. None where they are to be reckoned.
     twin : Ahead or None
         The same of the twin.
     """
@@ -102,6 +108,7 @@ class Ahead(NamedTuple):
     path: Path
     unrest: float
     block: filters.Block | None
+    gains: Gains | None = None
     twin: Ahead | None = None
 
 
@@ -115,3 +122,4 @@ class Met(NamedTuple):
     heard: float
     surprise_k: float
     block: filters.Block
+    gains: Gains | None = None

@@ -64,6 +64,8 @@ class Outlook(NamedTuple):
         Standard deviation of the gain, as each of them has it.
     lag_sd_s : float
         Standard deviation of the lag among the hypotheses.
+    lag_harmonic_s : float
+        Harmonic mean of the lag.
     """
 
     coasting_c: float
@@ -75,12 +77,21 @@ class Outlook(NamedTuple):
     spread_k: float = 0.0
     gain_sd: float = 0.0
     lag_sd_s: float = 0.0
+    lag_harmonic_s: float = 0.0
 
 
 def outlook(
-    block: Block, path: Path, share: Array, hypotheses: Hypotheses, constants: PerPeriod
+    block: Block,
+    path: Path,
+    share: Array,
+    hypotheses: Hypotheses,
+    constants: PerPeriod,
+    before: Outlook | None = None,
 ) -> Outlook:
-    """Return the means over the hypotheses, weighted by `share`."""
+    """Return the means over the hypotheses, weighted by `share`.
+
+    From one `before`, of the same weights and P, is taken what depends on nothing else.
+    """
     h, mean = hypotheses.period_s, share.dot
     d, beta = block[D, X], block[BETA, X]
     holding = np.minimum(np.maximum(d / beta, constants.power_min), constants.power_max)
@@ -90,7 +101,13 @@ def outlook(
     coasting_c, holding_power = float(mean(coasting)), float(mean(holding))
     coasting *= coasting
     variance = float(mean(coasting)) - coasting_c * coasting_c
-    lag_s = float(mean(hypotheses.lag_s))
+    if before is None:
+        lag_s = float(mean(hypotheses.lag_s))
+        gain_sd = math.sqrt(float(mean(block[BETA, BETA]))) / h
+        lag_sd_s = math.sqrt(max(float(mean(hypotheses.lag_squared)) - lag_s * lag_s, 0.0))
+        lag_harmonic_s = 1.0 / float(mean(hypotheses.lag_inverse))
+    else:
+        _, _, lag_s, _, _, _, _, gain_sd, lag_sd_s, lag_harmonic_s = before
     return Outlook(  # in the order of its fields: by their names it would take twice as long
         coasting_c,
         holding_power,
@@ -99,8 +116,9 @@ def outlook(
         float(mean(hypotheses.element * beta)),
         float(mean(path.heat)) - holding_power,
         math.sqrt(max(variance, 0.0)),
-        math.sqrt(float(mean(block[BETA, BETA]))) / h,
-        math.sqrt(max(float(mean(hypotheses.lag_squared)) - lag_s * lag_s, 0.0)),
+        gain_sd,
+        lag_sd_s,
+        lag_harmonic_s,
     )
 
 

@@ -200,8 +200,7 @@ class Adaptive:
         sign = self._sign
         bank, memory = trial.met(self.bank, bank, memory, sign * situation.measured_c, power)
         doubt = belief.doubt.after(_doubt(bank.outlook, self.plants))
-        due = bank.block is not None and bank.sample % SDS_EVERY == 0
-        sds = self._sds(bank, memory) if due else belief.sds
+        sds = self._sds(bank, memory) if _due(bank) else belief.sds
         surprise_k = math.nan if gathered or periods > 1 else sign * bank.surprise_k
         behind_s -= periods * h
         return AdaptiveBelief(bank, behind_s, 0.0, 0.0, doubt, memory, sds, surprise_k, inexact)
@@ -268,6 +267,14 @@ class Adaptive:
         if memory.verdict:
             remarks[memory.verdict] = memory.text
         return remarks
+
+
+def _due(bank: BankBelief) -> bool:
+    """Return whether standard deviations have to be reckoned anew: where gains are, with them."""
+    gains = bank.gains
+    if gains is not None and gains.settled:
+        return gains.age == 0
+    return bank.block is not None and bank.sample % SDS_EVERY == 0
 
 
 def _inexact(before: float, situation: Situation) -> float:

@@ -138,15 +138,6 @@ class Excitation(NamedTuple):
         return Excitation(self.mean_power + moved, share)
 
 
-def forgetting(hypotheses: Hypotheses, hearing: Hearing) -> Array:
-    """Return what each hypothesis would forget of the mean power in a second.
-
-    It is these that are averaged and not the times: as long as a short lag is as likely as a long
-    one, the mean is that of a short time.
-    """
-    return 1.0 / (hearing.memory_lags * hypotheses.lag_s)
-
-
 # -- outliers and jumps ---------------------------------------------------------------------------
 
 OUTLIERS = 2

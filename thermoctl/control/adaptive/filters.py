@@ -16,6 +16,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from thermoctl.control.adaptive.constants import Plants
 from thermoctl.control.adaptive.hypotheses import Hypotheses
@@ -170,15 +171,8 @@ def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0
     """
     after, a, c = block.copy(), constants.step, constants.soon
     water, sensor = after[T], after[Z]
-    towards = water - sensor
-    towards *= a
-    warming = block[BETA] * heat
-    warming -= block[D]
-    water += warming  # F [P | x]
+    warming = _carried(water, sensor, block[D], block[BETA], heat, a, c)  # F [P | x]
     grown(after, warming[X], constants)
-    sensor += towards
-    warming *= c
-    sensor += warming
     TT, ZT, ZZ = water[T], sensor[T], sensor[Z]
     towards = ZT - ZZ
     towards *= a[Z]
@@ -201,6 +195,29 @@ def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0
     DD += constants.noise_loss * (1.0 + constants.unrest * unrest) ** 2 * b2
     BB += constants.noise_gain * b2
     return after
+
+
+def moved(block: Block, heat: Array, constants: PerPeriod) -> Block:
+    """Return the block one period later as `predicted` does, but with P as it is."""
+    after = block.copy()
+    water, sensor, d, beta = after[:, X]
+    warming = _carried(water, sensor, d, beta, heat, constants.step[X], constants.soon[X])
+    grown(after, warming, constants)
+    return after
+
+
+def _carried(
+    water: Array, sensor: Array, d: Array, beta: Array, heat: Array, a: Array, c: Array
+) -> Array:
+    """Carry rows of water and sensor over a period, in place; return by what the water moved."""
+    towards = water - sensor
+    towards *= a
+    warming = beta * heat
+    warming -= d
+    water += warming
+    sensor += towards
+    sensor += warming * c
+    return warming
 
 
 def grown(block: Block, moved_k: Array, constants: PerPeriod) -> None:
@@ -271,13 +288,34 @@ def corrected(
     g /= np.sqrt(S)  # P H' / sqrt S, and beside it -nu / sqrt S
     after = g[:X, None] * g
     if proof < 1.0:  # of beta K = p g / sqrt S: Joseph's form differs from P - g g' here alone
-        most = constants.known_share * block[BETA, X]
-        most *= most
-        known, P, x = block[BETA, BETA] <= most, after[BETA, BETA], after[BETA, X]
+        known, P, x = _known(block, constants), after[BETA, BETA], after[BETA, X]
         np.multiply(P, proof * (2.0 - proof), out=P, where=known)
         np.multiply(x, proof, out=x, where=known)
     np.subtract(block, after, out=after)  # P - g g', x + g nu / sqrt S
     return after, nu * nu, S
+
+
+def followed(block: Block, y_c: float, K: Array) -> Block:
+    """Return the block with the states corrected by the gains `K` after reading `y_c`."""
+    after = block.copy()
+    x = after[:, X]
+    x += K * (y_c - x[Z])
+    return after
+
+
+def gains_at_rest(block: Block, S: Array, constants: PerPeriod) -> Array:
+    """Return the gains K, shape (4, n), with which `corrected` at 0 corrects the states."""
+    K: Array = block[Z, :X] / S
+    K[BETA, _known(block, constants)] = 0.0
+    return K
+
+
+def _known(block: Block, constants: PerPeriod) -> npt.NDArray[np.bool_]:
+    """Return of which hypotheses the gain beta is known, shape (n,)."""
+    most = constants.known_share * block[BETA, X]
+    most *= most
+    known: npt.NDArray[np.bool_] = block[BETA, BETA] <= most
+    return known
 
 
 def project(block: Block, constants: PerPeriod, *, loss: bool) -> None:

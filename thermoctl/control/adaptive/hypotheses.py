@@ -40,8 +40,8 @@ class Hypotheses:
         Time from one sample to the next.
     lag_s : ndarray
         Total lag L: dead time, heater and sensor together.
-    lag_squared : ndarray
-        Its square, in s^2.
+    lag_squared, lag_inverse : ndarray
+        Its square in s^2, and one over it, in 1/s.
     dead : ndarray of int
         Dead time in whole periods.
     element, sensor : ndarray
@@ -58,6 +58,7 @@ class Hypotheses:
     period_s: float
     lag_s: Array
     lag_squared: Array
+    lag_inverse: Array
     dead: npt.NDArray[np.intp]
     element: Array
     sensor: Array
@@ -95,6 +96,7 @@ class Hypotheses:
             period_s=float(period_s),
             lag_s=lag_s,
             lag_squared=lag_s * lag_s,
+            lag_inverse=1.0 / lag_s,
             dead=dead.astype(np.intp),
             element=element,
             sensor=sensor,
