@@ -159,8 +159,11 @@ class Guarded:
         variances = rows[1:].diagonal()
         if max(variances.tolist()) <= most:
             return rows
-        d = np.sqrt(most / np.maximum(variances, most))
         bounded = rows.copy()
+        if len(variances) == 1:  # most models, and at rest at every sample
+            bounded[1, 0] = most
+            return frozen(bounded)
+        d = np.sqrt(most / np.maximum(variances, most))
         bounded[1:] *= np.multiply.outer(d, d)
         return frozen(bounded)
 

@@ -139,19 +139,19 @@ class PlainBank:
                 each.begin(y)
         self.k += 1
         away = abs(u - self.told[0]) if self.k > 0 else 0.0
-        self.steady = self.settled and self.kept < 9 and e == 0 and away < 0.15
+        self.steady = self.settled and self.kept < 14 and e == 0 and away < 0.15
         self.steady &= not any(each.arrives(self.k * self.h) for each in self.filters)
         for each in self.filters:
             each.predict(away, self.k * self.h, self.steady)
         w = np.exp([each.ln_w for each in self.filters])
         expected = w @ [each.x[1] for each in self.filters] / w.sum()
         self.surprise = y - expected if self.k > 0 else math.nan
-        before, self.bound, self.settled = self.bound, None, False
+        before, self.bound, self.settled = (self.settled, self.bound), None, False
         if valid:
-            self.meet(y, e, away, before)
+            self.meet(y, e, away, *before)
         return self.decide(r)
 
-    def meet(self, y, e, away, bound):
+    def meet(self, y, e, away, settled, bound):
         if self.n >= 2:
             second = min((y - 2 * self.y1 + self.y2) ** 2 / 6, 9 * max(self.R_hat, 0.001))
             self.R_hat += (second - self.R_hat) * max(0.005, 1 / (self.n + 5))
@@ -209,17 +209,17 @@ class PlainBank:
             each.ln_w = max(each.ln_w - best, -30.0)
         from_s = max(4 * self.h, self.silent_until_s, self.learnt_from_s) - 1e-6
         quiet = e == 0 and away < 0.15 and not self.disturbed and self.k * self.h >= from_s
-        self.settle(quiet, self.filters.index(likeliest), bound)
+        if quiet and not self.steady:
+            self.settle(self.filters.index(likeliest), bound)
+        elif self.k * self.h >= from_s and bound is not None:
+            self.kept, self.settled, self.bound = self.kept + 1, settled, bound
 
-    def settle(self, quiet, m, before):
-        """Keep the gains of a plant at rest for nine samples, where they have come to stand."""
-        if self.steady:
-            self.bound, self.kept, self.settled = before, self.kept + 1, True
-            return
-        now = [each.K[2] * each.S for each in self.filters]
-        self.bound, self.kept = now if quiet else before, 0
-        compared = quiet and before is not None
-        self.settled = compared and abs(now[m] - before[m]) <= 0.01 * abs(now[m])
+    def settle(self, m, before):
+        """See whether the gains have come to stand; if so, they are kept for fourteen samples."""
+        self.kept, self.bound = 0, [each.K[2] * each.S for each in self.filters]
+        if before is not None:
+            moved = abs(self.bound[m] - before[m])
+            self.settled = moved <= 0.01 * abs(self.bound[m])
 
     def listen(self, nu, silent):
         limit = 3 * math.sqrt(max(self.means[2], 1e-5))

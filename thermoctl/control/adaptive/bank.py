@@ -323,7 +323,7 @@ class Bank:
         if gains is not None:
             block = filters.followed(block, y_c, gains.K)
             filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
-            return Met(noise, gate, weights, drifting, 0.0, surprise_k, block, gains.kept())
+            return Met(noise, gate, weights, drifting, 0.0, surprise_k, block, gains.older())
         silent_until = max(EVIDENCE_FROM, gate.silent_until, drifting.silent_until)
         heard, before = 0.0, block
         block, nis, S = filters.corrected(before, y_c, noise.believed, self.constants, share)
@@ -333,8 +333,8 @@ class Bank:
         if still and sample >= silent_until and not drifting.disturbed:
             K = filters.gains_at_rest(before, S, self.constants)
             gains = reckoned(belief.gains, K, S, m)
-        elif belief.gains is not None:
-            gains = belief.gains.unsettled()
+        elif sample >= silent_until and belief.gains is not None:
+            gains = belief.gains.older()  # power that moved has left them what they were
         if share > 0.0 and sample >= silent_until and not (noise.stands or drifting.suspected):
             heard = share * noise.colour.news
             weights = weights.after(heard, nis, S)

@@ -1,4 +1,4 @@
-"""Gains of the filters, which at rest are reckoned at every tenth sample only.
+"""Gains of the filters, which at rest are reckoned at every fifteenth sample only.
 
 The covariance of a Kalman filter does not depend on what is read. In a plant at rest it has come to
 where a reading takes away what a period has added, and the gains are those of the sample before. To
@@ -15,8 +15,8 @@ from typing import NamedTuple
 from thermoctl.control.adaptive.filters import D
 from thermoctl.quantities import Array
 
-KEPT_SAMPLES = 9
-"""So many samples after the one that reckoned them gains are kept."""
+KEPT_SAMPLES = 14
+"""For so many samples after the one that reckoned them gains are good."""
 SETTLED = 0.01
 """Gains have settled when what binds the loss to the reading, K S, changes by no more than this
 share: of all it is the slowest, and R, which wanders, does not count."""
@@ -34,7 +34,7 @@ class Gains(NamedTuple):
     age : int
         Samples since these were reckoned.
     settled : bool
-        Whether they are about what they were when reckoned before, and nothing has moved since.
+        Whether they are about what they were when reckoned before.
     """
 
     K: Array
@@ -47,13 +47,9 @@ class Gains(NamedTuple):
         """Whether they may be kept for another sample of rest."""
         return self.settled and self.age < KEPT_SAMPLES
 
-    def kept(self) -> Gains:
-        """Return the same, a sample of rest later."""
-        return Gains(self.K, self.S, self.age + 1, True)
-
-    def unsettled(self) -> Gains:
-        """Return the same after any other sample: to be reckoned before they are used again."""
-        return Gains(self.K, self.S) if self.settled else self
+    def older(self) -> Gains:
+        """Return the same, a sample later."""
+        return Gains(self.K, self.S, self.age + 1, self.settled)
 
 
 def reckoned(before: Gains | None, K: Array, S: Array, likeliest: int) -> Gains:
