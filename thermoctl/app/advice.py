@@ -19,7 +19,8 @@ ADVICE: Final[Mapping[str, str]] = {
     "heater.stuck_on": "the water gets warmer although the heater is commanded off: pull its plug "
     "now; its relay or triac may be welded",
     "output.nan": "the control law asked for no number: the journal tells which one",
-    "output.readback": "the output gives another power than was commanded: look at relay or triac",
+    "output.readback": "the output gives another power than was commanded: look at relay or triac; "
+    "one that is late by its nature needs window_s in the table of its actuator",
     "output.refused": "the board did not take a power: look at cable, port and supply",
     "plant.driven": "something else moves the water: does the heater give power although it is "
     "off, or is the room warmer than the set point?",

@@ -205,7 +205,7 @@ def _heater_check(table: LoopTable, controller: Controller) -> HeaterCheck | Non
 
 def _limits(table: LoopTable, controller: Controller) -> Limits:
     low_c, high_c = table.setpoint_range_c
-    cooler = table.cooler
+    cooler, actuator = table.cooler, table.actuator
     return Limits(
         trip_above_c=table.trip_above_c,
         trip_below_c=table.trip_below_c,
@@ -221,6 +221,8 @@ def _limits(table: LoopTable, controller: Controller) -> Limits:
         power_cools=action_of(controller) == COOL,
         # A block that cools down gives more than the loop above it asks for; that is no fault.
         applied_tolerance=Limits.APPLIED_TOLERANCE if table.leads is None else 1.0,
+        window_s=actuator.window_s if isinstance(actuator, ActuatorTable) else 0.0,
+        cooler_window_s=0.0 if cooler is None else cooler.window_s,
     )
 
 

@@ -34,6 +34,10 @@ class Limits:
         readings as well, is an outlier.
     applied_tolerance : float
         The hardware may take this much more than it was told before it counts as a fault.
+    window_s, cooler_window_s : float
+        How long heater or cooler may take over a command, at most: the window in which it takes its
+        power anew, or the least time it stays on. So many seconds of full power may be reported
+        beyond the commands before that is a fault; 0: two reports in a row are one.
     jump_widens : bool
         Whether a reading may also lie as far off as the gain that is believed in explains.
     power_min : float
@@ -58,6 +62,8 @@ class Limits:
     power_min: float = 0.0
     changeover_s: float = 0.0
     power_cools: bool = False
+    window_s: float = 0.0
+    cooler_window_s: float = 0.0
 
     APPLIED_TOLERANCE = _APPLIED_TOLERANCE
     HOLD_S = 3.0
@@ -95,8 +101,9 @@ class Limits:
             raise ValueError(f"power_max is a fraction of full power, got {self.power_max!r}")
         if not -1.0 <= self.power_min <= 0.0:
             raise ValueError(f"power_min must lie in [-1, 0], got {self.power_min!r}")
-        if self.changeover_s < 0.0:
-            raise ValueError(f"changeover_s must be at least 0, got {self.changeover_s!r}")
+        for name in ("changeover_s", "window_s", "cooler_window_s"):
+            if getattr(self, name) < 0.0:
+                raise ValueError(f"{name} must be at least 0, got {getattr(self, name)!r}")
         if self.power_cools and self.power_min < 0.0:
             raise ValueError("power_min must be 0 where power_cools: there is one actuator")
 

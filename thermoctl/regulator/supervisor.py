@@ -31,6 +31,7 @@ from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.changeover import Changeover
 from thermoctl.regulator.judge import Judged, Verdict, farthest, judge
 from thermoctl.regulator.limits import Limits
+from thermoctl.regulator.overdrawn import IN_ORDER
 from thermoctl.signals import Alarm, Command, Measurement, State
 
 _CIRCUITS = {Verdict.OPEN: ("sensor.open", 1), Verdict.SHORT: ("sensor.short", 2)}
@@ -39,7 +40,6 @@ _TRIPS = {
     Verdict.UNDER: ("trip.under_temperature", None),
 }
 _SENSOR_CODES = tuple(code for code, _ in (*_CIRCUITS.values(), *_TRIPS.values()))
-_FAILED_IN_A_ROW = 2
 
 Emit = Callable[..., None]
 
@@ -68,7 +68,8 @@ class Supervisor:
         self._tripping: Verdict | None = None
         self._tripped_lately = False
         self._opened_s: deque[float] = deque(maxlen=limits.OPEN_COUNT)
-        self._excess = 0
+        self._overdrawn = IN_ORDER
+        self._interval_s = limits.period_s
         self._last_power = 0.0
         self._taken = 0.0  # the last command, or what the actuators made of it
         # Heat and cold take turns only where there are both: then power goes below 0.
@@ -101,6 +102,7 @@ class Supervisor:
         before = self._judged.verdict
         self._judged = judge(self._judged, measurement, self.limits, jump_k)
         self._measurement = measurement
+        self._interval_s = interval_s
         self.seen_s = seen_s = self.limits.seen_s(interval_s)
         verdict = self._judged.verdict
         if verdict is Verdict.GOOD:
@@ -279,21 +281,37 @@ class Supervisor:
     def check_applied(self, commanded: float, applied: float, t_s: float) -> None:
         """Compare what was taken with the command: more, twice in a row, is a fault.
 
-        More of either: a cooler that is on while the heater was asked for is no less a fault.
+        More of either: a cooler that is on while the heater was asked for is no less a fault. An
+        output that may be late has its window first; one that does not say what it took has none.
         """
         limits = self.limits
         tolerance = limits.applied_tolerance
-        excess = not applied <= max(commanded, 0.0) + tolerance
-        if limits.power_min < 0.0:
-            excess = excess or applied < min(commanded, 0.0) - tolerance
+        beyond, window_s = applied - (max(commanded, 0.0) + tolerance), limits.window_s
+        if applied < 0.0 and limits.power_min < 0.0:
+            beyond, window_s = min(commanded, 0.0) - tolerance - applied, limits.cooler_window_s
         if math.isfinite(applied):
             self._taken = limits.possible(applied)
-        self._excess = self._excess + 1 if excess else 0
-        if self._excess >= _FAILED_IN_A_ROW:
+        else:
+            beyond = math.inf
+        if beyond > 0.0 or self._overdrawn is not IN_ORDER:
+            self._charge(beyond, window_s, commanded, applied, t_s)
+
+    def _charge(
+        self, beyond: float, window_s: float, commanded: float, applied: float, t_s: float
+    ) -> None:
+        """Keep the account of what the output gave beyond its commands."""
+        before = self._overdrawn
+        after = before.after(beyond, self._interval_s, window_s)
+        self._overdrawn = IN_ORDER if after.settled else after
+        if after.stuck:
             text = (
                 f"expected at most {commanded:.3f} of full power, the output reports {applied:.3f}"
             )
+            if window_s > 0.0:
+                text += f", and its window of {window_s:g} s is over"
             self.fail("output.readback", 25, text, t_s)
+        elif before.stuck:
+            self._emit("output.in_order", after_s=after.lasted_s)
 
     # -- words -----------------------------------------------------------------------------------
 

@@ -101,6 +101,7 @@ _BY_LEVEL: Final = {
         "model.trusted",
         "orders.changed",
         "output.changed",
+        "output.in_order",
         "plant.changed",
         "request.refused",
         "setpoint.changed",

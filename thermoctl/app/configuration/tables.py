@@ -87,6 +87,11 @@ class ActuatorTable(Table):
         "linear", description="linear: the board takes power itself; square: P ~ V^2; ..."
     )
     cycles: int = Field(50, ge=1, description="Mains cycles of one burst, for law burst.")
+    window_s: Annotated[float, Field(ge=0.0, le=600.0)] = Field(
+        0.0,
+        description="How late the output may obey: its window, or the least time it stays on; what "
+        "it reports beyond the command for longer is a fault.",
+    )
 
 
 class CascadeTable(Table):

@@ -79,6 +79,7 @@ _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
         Mark.NONE,
         ("Power {after_power} by hand, was {before_power}", "Power by hand changed"),
     ),
+    "output.in_order": (Mark.NONE, ("Output in order after {after_s}", "Output in order again")),
     "output.nan": (Mark.WARNING, ("No number from {controller}: power 0", "No number: power 0")),
     "output.readback": (Mark.WARNING, ("Output differs: {text}", "Output differs from command")),
     "output.refused": (Mark.WARNING, ("Output refused: {text}", "Output refused")),
