@@ -191,16 +191,16 @@ def _within(name: str, table: BaseModel) -> Iterator[None]:
 
 
 def _heater_check(table: LoopTable, controller: Controller) -> HeaterCheck | None:
-    """Return how the heater is checked; not beside a cooler or without output."""
+    """Return how the heater is checked; not where another loop acts in its place."""
     check = table.heater_check
     drives = table.actuator is None or isinstance(table.actuator, ActuatorTable)
-    if not check.enabled or table.cooler is not None or not drives:
+    if not check.enabled or not drives:
         return None
-    cools = action_of(controller) == COOL
     weakest = check.weakest_k_per_s
     if weakest is None:
         weakest = weakest_of(table.heater_w)
-    return HeaterCheck(weakest, check.first_heat_s, "cool" if cools else "heat")
+    action: Any = action_of(controller)  # a plug-in's may be anything, and is refused there
+    return HeaterCheck(weakest, check.first_heat_s, action)
 
 
 def _limits(table: LoopTable, controller: Controller) -> Limits:

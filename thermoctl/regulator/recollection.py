@@ -15,7 +15,7 @@ from thermoctl.ports import Remembered, Remembering
 from thermoctl.regulator.guard import Failure, attempt
 from thermoctl.regulator.heater import memory as heater_memory
 from thermoctl.regulator.heater.response import Gain
-from thermoctl.regulator.heater.watch import HeaterWatch
+from thermoctl.regulator.heater.sides import Watch, named
 from thermoctl.regulator.mind import Mind
 from thermoctl.regulator.supervisor import Emit
 
@@ -38,17 +38,16 @@ def recall(minds: Iterable[Mind | None], remembered: Mapping[str, Remembered], e
             emit("model.recalled", controller=mind.name, age_s=round(kept.age_s))
 
 
-def recall_heater(
-    watch: HeaterWatch | None, remembered: Mapping[str, Remembered], emit: Emit
-) -> None:
-    """Let the `watch` over a heater begin with what is remembered of it."""
-    kept = remembered.get(heater_memory.NAME)
-    if watch is None or kept is None:
-        return
-    try:
-        watch.recall(heater_memory.recall(kept.model))
-    except ValueError as error:
-        emit("model.ignored", controller=heater_memory.NAME, why=str(error))
+def recall_heater(watch: Watch | None, remembered: Mapping[str, Remembered], emit: Emit) -> None:
+    """Let the `watch` over a heater, or two, begin with what is remembered."""
+    for name, each in named(watch).items():
+        kept = remembered.get(name)
+        if kept is None:
+            continue
+        try:
+            each.recall(heater_memory.recall(kept.model))
+        except ValueError as error:
+            emit("model.ignored", controller=name, why=str(error))
 
 
 def origin(mind: Mind) -> str | None:
@@ -59,23 +58,26 @@ def origin(mind: Mind) -> str | None:
     return told if isinstance(told, str) else None
 
 
-def remembering(minds: Iterable[Mind | None], watch: HeaterWatch | None) -> Callable[[], Models]:
+def remembering(minds: Iterable[Mind | None], watch: Watch | None) -> Callable[[], Models]:
     """Return a function that says what `minds` and `watch` would like kept now."""
     held = [
         (mind.name, mind.remembers, mind.belief)
         for mind in minds
         if mind is not None and mind.remembers is not None
     ]
-    return partial(_remembered, held, None if watch is None else watch.known)
+    return partial(_remembered, held, [(name, each.known) for name, each in named(watch).items()])
 
 
-def _remembered(held: Iterable[tuple[str, Remembering, Any]], heater: Gain | None) -> Models:
-    """Return what each law makes of its belief, nothing of one that fails; and the heater."""
+def _remembered(
+    held: Iterable[tuple[str, Remembering, Any]], heaters: Iterable[tuple[str, Gain | None]]
+) -> Models:
+    """Return what each law makes of its belief, nothing of one that fails; and the heaters."""
     models: dict[str, Mapping[str, Any]] = {}
     for name, law, belief in held:
         told = attempt(law.remember, belief)
         if told is not None and not isinstance(told, Failure):
             models[name] = told
-    if heater is not None:
-        models[heater_memory.NAME] = heater_memory.remember(heater)
+    for name, heater in heaters:
+        if heater is not None:
+            models[name] = heater_memory.remember(heater)
     return models

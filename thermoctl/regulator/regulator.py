@@ -14,7 +14,7 @@ from thermoctl.ports import Controller, Remembered, Situation
 from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.feasible import Feasibility, Wanted
 from thermoctl.regulator.guard import Failure, Guard, attempt
-from thermoctl.regulator.heater.watch import HeaterWatch
+from thermoctl.regulator.heater.sides import Watch, watch_for
 from thermoctl.regulator.judge import Verdict
 from thermoctl.regulator.learning import Learning
 from thermoctl.regulator.load import KnownLoad
@@ -89,10 +89,10 @@ class Regulator:
         self._pairing = Pairing(
             plan.limits, plan.disagreement_k, self._supervisor.alarms, self._emit
         )
-        self._watch: HeaterWatch | None = None
+        self._watch: Watch | None = None
         if plan.heater_check is not None:
             period_s = plan.limits.period_s
-            self._watch = HeaterWatch(plan.heater_check, period_s, self._supervisor, self._emit)
+            self._watch = watch_for(plan.heater_check, period_s, self._supervisor, self._emit)
         self._jump_k = plan.limits.jump_k
         self._t_s: float | None = None
         self._command = Command(0.0, -math.inf, "start")

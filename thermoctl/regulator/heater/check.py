@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
 
 from thermoctl.quantities import clamp
 from thermoctl.ranges import check_ranges, ranged
@@ -27,8 +27,8 @@ class HeaterCheck:
         Seconds of full power an unknown heater has to show that it heats, before it is asked. Less
         power has longer, by its cube: it does less harm, and a plant that is only held at its set
         point shows no rise.
-    action : {'heat', 'cool'}
-        What power does to the plant.
+    action : {'heat', 'cool', 'heat-cool'}
+        What power does to the plant; heat-cool: above 0 the one and below 0 the other.
 
     Raises
     ------
@@ -38,12 +38,35 @@ class HeaterCheck:
 
     weakest_k_per_s: float = ranged(WEAKEST_K_PER_S, 1e-6, 0.5)
     first_heat_s: float = ranged(60.0, 10.0, 3600.0)
-    action: Literal["heat", "cool"] = "heat"
+    action: Literal["heat", "cool", "heat-cool"] = "heat"
 
     def __post_init__(self) -> None:
         check_ranges(self)
-        if self.action not in ("heat", "cool"):
-            raise ValueError(f"action must be 'heat' or 'cool', got {self.action!r}")
+        if self.action not in ("heat", "cool", "heat-cool"):
+            raise ValueError(f"action must be 'heat', 'cool' or 'heat-cool', got {self.action!r}")
+
+    @property
+    def of_heater(self) -> HeaterCheck:
+        """How the heater is checked, where there is a cooler beside it."""
+        return replace(self, action="heat")
+
+    @property
+    def of_cooler(self) -> HeaterCheck:
+        """How that cooler is checked; how weak it may be, nobody has said."""
+        weakest_k_per_s = min(self.weakest_k_per_s, WEAKEST_K_PER_S)
+        return replace(self, action="cool", weakest_k_per_s=weakest_k_per_s)
+
+
+class Reacts(Protocol):
+    """Who is told of a fault, and switches off: the supervisor."""
+
+    def fail(self, code: str, fault: int | None, text: str, t_s: float) -> None:
+        """Go to SAFE."""
+        ...
+
+    def latch(self, code: str, fault: int | None, text: str, t_s: float) -> None:
+        """Go to LATCHED."""
+        ...
 
 
 def weakest_of(heater_w: float | None) -> float:

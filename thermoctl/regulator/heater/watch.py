@@ -13,7 +13,7 @@ from collections import deque
 
 from thermoctl.regulator.heater import climb, evidence, question, trial
 from thermoctl.regulator.heater.blocks import Blocks, Repeats
-from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.check import HeaterCheck, Reacts
 from thermoctl.regulator.heater.climb import Climb
 from thermoctl.regulator.heater.cut import Cut
 from thermoctl.regulator.heater.doubt import HeatDoubt, Seen
@@ -21,7 +21,7 @@ from thermoctl.regulator.heater.known import OFF_LAGS, KnownHeater, arrived
 from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S, CREPT_LAGS, Answer
 from thermoctl.regulator.heater.response import Block, Gain, HeatResponse
 from thermoctl.regulator.heater.trial import Trial
-from thermoctl.regulator.supervisor import Emit, Supervisor
+from thermoctl.regulator.supervisor import Emit
 
 OFF = 0.01
 """Power below this is none."""
@@ -62,30 +62,26 @@ class HeaterWatch:
         What is admissible.
     period_s : float
         Nominal time between two samples.
-    supervisor : Supervisor
+    supervisor : Reacts
         Who is told of a fault.
     emit : callable
         Called as ``emit(name, **fields)`` when a question is put, and when it is answered well.
     """
 
-    def __init__(
-        self, check: HeaterCheck, period_s: float, supervisor: Supervisor, emit: Emit
-    ) -> None:
+    def __init__(self, check: HeaterCheck, period_s: float, supervisor: Reacts, emit: Emit) -> None:
         self._weakest = check.weakest_k_per_s
         self._unknown_s = max(60.0, 10.0 * period_s)
         self._blocks = Blocks(period_s, 1.0 if check.action == "heat" else -1.0)
         self._repeats = Repeats()
         self._response, self._doubt, self._climb = HeatResponse(), HeatDoubt(), Climb()
         self._supervisor, self._emit = supervisor, emit
-        self._heater = KnownHeater()
+        self._heater, self._trial = KnownHeater(), Trial(check)
         self._settled_s = 0.0  # from then on, what was on its way at the start has arrived
         self._rows: deque[Seen] = deque(maxlen=ROWS)
         self._cut: Cut | None = None
         self._t_s = self._off_s = 0.0
-        self._failed_s = -math.inf
-        self._refused_c = -math.inf  # what an unknown one that answered badly has to rise beyond
+        self._failed_s = self._refused_c = -math.inf  # the latter: what one that was is to pass
         self._distrusted_k = 0.0  # heat that must be answered before anything is learnt again
-        self._trial = Trial(check)
 
     @property
     def asks(self) -> bool:
@@ -123,6 +119,16 @@ class HeaterWatch:
         block = self._blocks.add(interval_s, reading_c, applied)
         if block is not None:
             self._meet(block, t_s)
+
+    @property
+    def under_way_s(self) -> float:
+        """How long after its power heat of this one may still arrive."""
+        return self._heater.under_way_s
+
+    def stand_aside(self, under_way_s: float) -> None:
+        """Leave the reading to another actuator, whose heat lasts `under_way_s`."""
+        self._lose_track()
+        self._off_s, self._settled_s = 0.0, self._t_s + under_way_s
 
     def _lose_track(self) -> None:
         """After a long gap nobody knows what was applied."""
@@ -317,8 +323,8 @@ class HeaterWatch:
         return heated
 
     def _rising(self, known: Gain, now: Seen, sd_k: float) -> float:
-        """Return how fast the reading surely rises, in K/s, when nothing is under way any more."""
-        from_s = now.t_s - max(OFF_LAGS * known.lag_s, BEFORE_S)
+        """Return how fast the reading has surely risen since the power went, lately, in K/s."""
+        from_s = now.t_s - min(max(OFF_LAGS * known.lag_s, BEFORE_S), self._off_s)
         return question.slope(self._rows, from_s, less_sd_k=sd_k)
 
     def _wild(self, known: Gain, from_s: float, gains: float) -> bool:

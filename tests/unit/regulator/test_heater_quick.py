@@ -1,0 +1,31 @@
+"""The watch over a heater that warms by kelvins in a second: a block with a bath around it."""
+
+import numpy as np
+
+from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.watch import HeaterWatch
+from thermoctl.regulator.limits import Limits
+from thermoctl.regulator.supervisor import Supervisor
+from thermoctl.signals import State
+
+LIMITS = Limits(200.0, -50.0, -50.0, 200.0)
+LEARNT_S = 1200
+ROSE_K = (0.2, 2.4, 6.4, 10.5, 11.6, 10.8, 9.6, 8.3, 7.1, 6.1, 5.3, 4.4, 3.6, 3.0, 2.4, 1.9)
+"""What a block shows of three seconds of full power, in a bath that soon has all of it."""
+
+
+def test_a_rise_before_the_power_went_is_no_rise_without_power():
+    told = []
+    supervisor = Supervisor(LIMITS, lambda name, **_: told.append(name))
+    watch = HeaterWatch(HeaterCheck(), 1.0, supervisor, lambda name, **_: told.append(name))
+    rng, block_c, shown_c, applied = np.random.default_rng(1), 40.0, 40.0, 0.0
+    for second in range(LEARNT_S + 60):
+        block_c += 0.5 * applied - 0.075
+        shown_c += (block_c - shown_c) / 2.0
+        since_s = second - LEARNT_S
+        extra_k = ROSE_K[since_s] if 0 <= since_s < len(ROSE_K) else 0.0
+        watch.observe(float(second), 1.0, shown_c + extra_k + 0.05 * rng.standard_normal(), applied)
+        asked = 0.6 * (second % 120 < 30) if since_s < -1 else float(since_s < 2)
+        applied = 0.0 if watch.asks or supervisor.state is not State.RUN else asked
+    assert "heater.questioned" in told
+    assert "heater.stuck_on" not in told
