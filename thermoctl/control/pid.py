@@ -18,12 +18,14 @@ from thermoctl.control.relay import RelayTest
 from thermoctl.control.simc import Gains
 from thermoctl.control.step_test import StepTest
 from thermoctl.ports import Situation
-from thermoctl.quantities import is_finite_number
+from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.ranges import require
 from thermoctl.signals import Beliefs
 
 INEXACT = 0.1
 """An output that gives less than its command by more than this is limited, and not inexact."""
+AHEAD_S = 60.0
+"""No output is ahead of its commands by more than this, in seconds of full power."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +40,15 @@ class PidBelief:
         How its gains came about, or will.
     kept : Gains or None
         What an earlier run has found; in force until a test of this one has found something.
+    ahead_s : float
+        What a pulsing output gave beyond its commands and has not left out since, in seconds of
+        full power.
     """
 
     terms: Terms = field(default_factory=Terms)
     tuning: Tuning = field(default_factory=Tuning)
     kept: Gains | None = None
+    ahead_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,14 +185,15 @@ class Pid:
         if self.autotune is not None:
             tuning = self.autotune.observe(tuning, situation)
         before, interval_s = belief.terms, situation.interval_s
-        setpoint_c, given = situation.setpoint_c, _given(situation)
+        ahead_s = _ahead(belief.ahead_s, situation)
+        setpoint_c, given = situation.setpoint_c, _given(situation, pulses=ahead_s > 0.0)
         terms = law.see(before, situation.temperature_c, interval_s)
         known = math.isfinite(before.seen_c) and math.isfinite(setpoint_c)
         if known and math.isfinite(before.asked) and interval_s < law.gains.integral_s:
             terms = law.integrate(terms, setpoint_c, given, interval_s)
         elif known:
             terms = law.track(terms, setpoint_c, given)
-        return PidBelief(replace(terms, asked=math.nan), tuning, belief.kept)
+        return PidBelief(replace(terms, asked=math.nan), tuning, belief.kept, ahead_s)
 
     def decide(self, belief: PidBelief, situation: Situation) -> tuple[PidBelief, float]:
         """Return the power of the law or of its test, not bounded; NaN when not known."""
@@ -198,13 +205,13 @@ class Pid:
         if self.autotune is not None:
             tuning, power = self.autotune.decide(tuning, situation)
             if power is not None:
-                return PidBelief(terms, tuning, belief.kept), power
-        law = self._law(PidBelief(terms, tuning, belief.kept))
+                return replace(belief, tuning=tuning), power
+        law = self._law(replace(belief, tuning=tuning))
         if math.isnan(terms.integral) or tuning.outcome is not belief.tuning.outcome:
             holding = tuning.outcome.holding_power if isinstance(tuning.outcome, Found) else 0.0
             terms = law.at_rest(terms, setpoint_c, holding)
         power = law.power(terms, setpoint_c)
-        return PidBelief(replace(terms, asked=power), tuning, belief.kept), power
+        return replace(belief, terms=replace(terms, asked=power), tuning=tuning), power
 
     def gains(self, belief: PidBelief) -> Gains:
         """Return the gains in force."""
@@ -247,16 +254,27 @@ class Pid:
         return {}
 
 
-def _given(situation: Situation) -> float:
+def _given(situation: Situation, *, pulses: bool) -> float:
     """Return the power that limits and others have left of what was asked for.
 
     An output that gives more than the command, or a little less, is not exact, and its error is for
-    the integral to find: a law that follows it adds it to its own power at every sample.
+    the integral to find: a law that follows it adds it to its own power at every sample. Nor is one
+    limited that leaves out what it gave too much before: it `pulses`.
     """
     applied, commanded = situation.applied, situation.commanded
-    if math.isnan(commanded) or abs(applied) < abs(commanded) - INEXACT:
-        return applied
-    return commanded
+    limited = abs(applied) < abs(commanded) - INEXACT and not pulses
+    return applied if limited or math.isnan(commanded) else commanded
+
+
+def _ahead(before_s: float, situation: Situation) -> float:
+    """Return by how much an output is ahead of its commands after this sample.
+
+    Limits never give more than was asked for, relays do, and then less: those are on or off.
+    """
+    beyond = abs(situation.applied) - abs(situation.commanded)
+    if beyond > INEXACT or (beyond < 0.0 and before_s > 0.0):
+        return clamp(before_s + beyond * situation.interval_s, 0.0, AHEAD_S)
+    return before_s
 
 
 def _in_words(gains: Gains) -> str:
