@@ -191,16 +191,17 @@ def _within(name: str, table: BaseModel) -> Iterator[None]:
 
 
 def _heater_check(table: LoopTable, controller: Controller) -> HeaterCheck | None:
-    """Return how the heater is checked; not where another loop acts in its place."""
+    """Return how the heater is checked, or the loop that acts in its place."""
     check = table.heater_check
-    drives = table.actuator is None or isinstance(table.actuator, ActuatorTable)
-    if not check.enabled or not drives:
+    if not check.enabled:
         return None
     weakest = check.weakest_k_per_s
     if weakest is None:
         weakest = weakest_of(table.heater_w)
     action: Any = action_of(controller)  # a plug-in's may be anything, and is refused there
-    return HeaterCheck(weakest, check.first_heat_s, action)
+    leads = table.leads
+    block_c = None if leads is None else (leads.low_c, leads.high_c)
+    return HeaterCheck(weakest, check.first_heat_s, action, block_c)
 
 
 def _limits(table: LoopTable, controller: Controller) -> Limits:

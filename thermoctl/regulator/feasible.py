@@ -73,7 +73,8 @@ class Wanted:
     """What is to be held, in `mode`: a set point in degC, with at most `power_max`.
 
     `ramp_s` is how long the reference is still on its way there; `power_cools` says what power does
-    where it is wired as it should be.
+    where it is wired as it should be. `led`: it is another loop that wants it, and never all of it
+    at once: nothing is told of such a set point.
     """
 
     setpoint_c: float
@@ -81,6 +82,12 @@ class Wanted:
     mode: Mode
     ramp_s: float = 0.0
     power_cools: bool = False
+    led: bool = False
+
+    @property
+    def counts(self) -> bool:
+        """Whether anybody is told that it cannot be held."""
+        return self.mode is Mode.AUTO and not self.led
 
 
 class Standing:
@@ -293,7 +300,7 @@ class Feasibility:
             (DRIVEN, driven_sds, _driven_words),
         ):
             standing = self._standings[code]
-            news = standing.weigh(sds, counts=wanted.mode is Mode.AUTO)
+            news = standing.weigh(sds, counts=wanted.counts)
             if standing.stands:
                 text = words(self.known, belief, wanted)
                 if self._alarms.set(Alarm(code, None, _PRIORITY, t_s, text)) and news:

@@ -292,7 +292,9 @@ class Regulator:
         self, interval_s: float, applied: float, temperature_c: float, lag_s: float | None
     ) -> None:
         """Keep the balance of heat."""
-        beyond = self._applied_power() - self._command.power
+        beyond = self._applied_power() - self._commanded_power()
+        if not math.isfinite(beyond):
+            beyond = 0.0
         if self._feasibility.observe(interval_s, applied, temperature_c, lag_s, beyond):
             self._feasibility.reckon(self._wanted(), self._t_s or 0.0)
 
@@ -300,7 +302,12 @@ class Regulator:
         wishes = self._wishes
         limits = self._limits
         return Wanted(
-            wishes.setpoint_c, limits.power_max, wishes.mode, wishes.ramp_s, limits.power_cools
+            wishes.setpoint_c,
+            limits.power_max,
+            wishes.mode,
+            wishes.ramp_s,
+            limits.power_cools,
+            wishes.led,
         )
 
     def _jump_for(self, beliefs: Beliefs) -> float:

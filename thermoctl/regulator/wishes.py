@@ -45,6 +45,11 @@ class Wishes:
         self.manual_power = 0.0
         self._led = False
 
+    @property
+    def led(self) -> bool:
+        """Whether another loop says what to hold."""
+        return self._led
+
     def want_mode(self, mode: Mode, given: float) -> None:
         """Go to `mode`, while the power `given` is taken; manual goes on with it."""
         if mode is Mode.PROGRAM:

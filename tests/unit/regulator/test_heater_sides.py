@@ -161,3 +161,34 @@ def test_a_loop_with_a_cooler_is_watched_on_both_sides():
     check = plan_for(settings.loop()[1]).heater_check
     assert check.action == "heat-cool"
     assert isinstance(watch_for(check, 1.0, Supervisor(LIMITS, print), print), Sides)
+
+
+def test_a_bath_that_a_block_heats_is_watched_by_the_heat_that_flows():
+    check = HeaterCheck(block_c=(20.0, 80.0))
+    seen = []
+    watch = watch_for(check, 1.0, Supervisor(LIMITS, print), print)
+    watch.inner.observe = lambda t_s, interval_s, reading_c, power: seen.append(power)
+    for reading_c, block_c in ((38.0, 80.0), (38.0, 38.0), (38.0, 30.0), (np.nan, 68.0)):
+        watch.observe(0.0, 1.0, reading_c, (block_c - 20.0) / 60.0)
+    assert seen == pytest.approx([0.7, 0.0, 0.0, 0.5])
+    assert list(named(watch)) == ["heater-check"]
+
+
+def test_before_the_first_reading_of_the_bath_no_heat_is_known_to_flow():
+    seen = []
+    watch = watch_for(HeaterCheck(block_c=(20.0, 80.0)), 1.0, Supervisor(LIMITS, print), print)
+    watch.inner.observe = lambda t_s, interval_s, reading_c, power: seen.append(power)
+    watch.observe(0.0, 1.0, np.nan, 1.0)
+    assert seen == [0.0]
+
+
+def test_a_loop_that_leads_another_is_watched_between_the_block_s_temperatures():
+    bath = {
+        "setpoint_c": 37.5,
+        "trip_above_c": 60.0,
+        "actuator": {"loop": "block", "low_c": 20.0, "high_c": 80.0},
+    }
+    block = {"setpoint_c": 20.0, "trip_above_c": 95.0}
+    settings = load({"loops": {"bath": bath, "block": block}})
+    assert plan_for(settings.loop("bath")[1]).heater_check.block_c == (20.0, 80.0)
+    assert plan_for(settings.loop("block")[1]).heater_check.block_c is None

@@ -30,6 +30,9 @@ class HeaterCheck:
     action : {'heat', 'cool', 'heat-cool'}
         What power does to the plant; heat-cool: above 0 the one and below 0 the other.
 
+    block_c : tuple of float, optional
+        Where another loop acts in place of a heater: its temperatures at power 0 and 1, in degC.
+
     Raises
     ------
     ValueError
@@ -39,6 +42,7 @@ class HeaterCheck:
     weakest_k_per_s: float = ranged(WEAKEST_K_PER_S, 1e-6, 0.5)
     first_heat_s: float = ranged(60.0, 10.0, 3600.0)
     action: Literal["heat", "cool", "heat-cool"] = "heat"
+    block_c: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         check_ranges(self)

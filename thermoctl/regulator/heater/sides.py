@@ -14,6 +14,7 @@ from typing import Final
 
 from thermoctl.regulator.heater import memory
 from thermoctl.regulator.heater.check import HeaterCheck, Reacts
+from thermoctl.regulator.heater.led import LedWatch
 from thermoctl.regulator.heater.watch import OFF, HeaterWatch
 from thermoctl.regulator.supervisor import Emit
 
@@ -77,17 +78,19 @@ class _Named:
         self._supervisor.latch(code, fault, _COOLER + text, t_s)
 
 
-Watch = HeaterWatch | Sides
-"""What watches the one actuator of a loop, or both."""
+Watch = HeaterWatch | LedWatch | Sides
+"""What watches the one actuator of a loop, the block that acts in its place, or both."""
 
 
 def watch_for(check: HeaterCheck, period_s: float, supervisor: Reacts, emit: Emit) -> Watch:
     """Return what watches the actuators of a loop."""
+    if check.block_c is not None:
+        return LedWatch(check, period_s, supervisor, emit)
     kind = Sides if check.action == "heat-cool" else HeaterWatch
     return kind(check, period_s, supervisor, emit)
 
 
-def named(watch: Watch | None) -> Mapping[str, HeaterWatch]:
+def named(watch: Watch | None) -> Mapping[str, HeaterWatch | LedWatch]:
     """Return every watch by the name under which it remembers what it knows."""
     if isinstance(watch, Sides):
         return {memory.NAME: watch.heater, memory.COOLER_NAME: watch.cooler}
