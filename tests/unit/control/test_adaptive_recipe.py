@@ -26,6 +26,7 @@ class Filter:
     P: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
     K: np.ndarray = field(default_factory=lambda: np.zeros(4))
     S: float = 0.0
+    knew: float = 0.0
 
     def __post_init__(self):
         pipe = self.shape is None  # and what is beyond heater and sensor, 20 s of both, is dead
@@ -62,6 +63,7 @@ class Filter:
         self.grow(self.x[0] - before)
         if steady:
             return
+        self.knew = self.P[2, 2]
         self.P = F @ self.P @ F.T + self.h * np.diag(noise)
         if self.arrives(t_s):
             ridge = np.array([0, 0, 1, 1]) * 0.08 * self.x[3] * self.q
@@ -117,7 +119,12 @@ class PlainBank:
         self.calm, self.sums, self.disturbed = 0, [0.0, 0.0], False
         self.learnt_from_s = -math.inf
         self.misses, self.means, self.colour, self.most = [], np.array([0.0, 0.0, 1e-3]), 0.0, 1.0
-        self.bound, self.settled, self.kept = None, False, 0  # K S of the loss, and its standing
+        self.missed, self.bound, self.settled, self.kept = (
+            0,
+            None,
+            False,
+            0,
+        )  # K S of the loss, and its standing
 
     def step(self, y, applied, r):
         u = min(max(applied, self.u_min), self.u_max)
@@ -207,19 +214,24 @@ class PlainBank:
         best = max(each.ln_w for each in self.filters)
         for each in self.filters:
             each.ln_w = max(each.ln_w - best, -30.0)
-        from_s = max(4 * self.h, self.silent_until_s, self.learnt_from_s) - 1e-6
+        from_s = self.learnt_from_s - 1e-6
         quiet = e == 0 and away < 0.15 and not self.disturbed and self.k * self.h >= from_s
-        if quiet and not self.steady:
-            self.settle(self.filters.index(likeliest), bound)
-        elif self.k * self.h >= from_s and bound is not None:
+        if self.k * self.h >= from_s and bound is not None:
             self.kept, self.settled, self.bound = self.kept + 1, settled, bound
+            self.missed += self.steady
+        if quiet and not self.steady and (bound is None or self.kept >= 14):
+            self.settle(self.filters.index(likeliest), bound)
 
     def settle(self, m, before):
-        """See whether the gains have come to stand; if so, they are kept for fourteen samples."""
-        self.kept, self.bound = 0, [each.K[2] * each.S for each in self.filters]
+        """See whether the gains have come to stand; if so, they are good for fourteen samples."""
+        for each in self.filters if before is not None and self.missed else ():
+            share = min(max(each.P[2, 2] / each.knew, 0.97), 1.03)
+            scale = np.diag([1.0, 1.0, share ** (self.missed / 2), 1.0])
+            each.P, each.K = scale @ each.P @ scale, scale @ each.K
+        self.missed = self.kept = 0
+        self.bound = [each.K[2] * each.S for each in self.filters]
         if before is not None:
-            moved = abs(self.bound[m] - before[m])
-            self.settled = moved <= 0.01 * abs(self.bound[m])
+            self.settled = abs(self.bound[m] - before[m]) <= 0.05 * abs(self.bound[m])
 
     def listen(self, nu, silent):
         limit = 3 * math.sqrt(max(self.means[2], 1e-5))

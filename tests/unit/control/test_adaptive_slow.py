@@ -7,6 +7,7 @@ import pytest
 
 from thermoctl.control.adaptive import Adaptive
 from thermoctl.control.adaptive.bank import Bank
+from thermoctl.control.adaptive.coasting import outlook
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
 
@@ -72,9 +73,10 @@ def test_a_move_of_the_power_is_heard_until_its_heat_has_arrived(lag_s, heard_s)
     belief = bank.observe(bank.start(), 25.0, 0.0)
     nearest = np.abs(bank.hypotheses.lag_s - lag_s) == np.abs(bank.hypotheses.lag_s - lag_s).min()
     weights = belief.weights._replace(share=nearest / nearest.sum())
+    known = outlook(belief.block, belief.path, weights.share, bank.hypotheses, bank.constants)
     heard, power = 0, 1.0
     while belief.excitation.share > 0.0 or heard == 0:
-        belief = bank.observe(belief, 25.0, power)._replace(weights=weights)
+        belief = bank.observe(belief, 25.0, power)._replace(weights=weights, outlook=known)
         heard += 1
     assert heard == pytest.approx(heard_s, rel=0.02)
 

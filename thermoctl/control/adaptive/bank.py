@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from thermoctl.control.adaptive import evidence, filters, path
+from thermoctl.control.adaptive import evidence, filters, foretelling, path
 from thermoctl.control.adaptive.bank_belief import Ahead, BankBelief, Met, Twin
 from thermoctl.control.adaptive.coasting import outlook
 from thermoctl.control.adaptive.constants import Hearing, Lags, Plants
@@ -29,7 +29,7 @@ from thermoctl.control.adaptive.evidence import (
     Noise,
     Weights,
 )
-from thermoctl.control.adaptive.filters import T, X, Z
+from thermoctl.control.adaptive.filters import D, T, X, Z
 from thermoctl.control.adaptive.gains import Gains, reckoned
 from thermoctl.control.adaptive.hypotheses import Hypotheses
 from thermoctl.control.adaptive.path import Path
@@ -85,7 +85,7 @@ class Bank:
         constants = filters.per_period(hypotheses, self.plants, *self.bounds)
         object.__setattr__(self, "hypotheses", hypotheses)
         object.__setattr__(self, "constants", constants)
-        object.__setattr__(self, "_arrivals", _arrivals(hypotheses, self.plants))
+        object.__setattr__(self, "_arrivals", filters.arrivals(hypotheses, self.plants))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -165,7 +165,9 @@ class Bank:
     def _kept(self, belief: BankBelief, excitation: Excitation, unrest: float) -> Gains | None:
         """Return the gains if they can be kept for one more sample; None if they cannot."""
         gains = belief.gains
-        if gains is None or not gains.lasting or not self._still(excitation.share, unrest):
+        if gains is None or not (gains.settled and gains.fresh):
+            return None
+        if not self._still(excitation.share, unrest):
             return None
         return None if belief.sample + 1 in self._arrivals else gains
 
@@ -186,35 +188,13 @@ class Bank:
 
     def foretold(self, belief: BankBelief, ahead: Ahead, y_c: float) -> float:
         """Return the log likelihood of `y_c`; of twins that of both, as far as likely."""
-        alone, twin = self._foretold(belief, ahead, y_c, belief.weights)[0], belief.twin
+        most_sds, twin = self.hearing.gate_sds, belief.twin
+        alone = foretelling.of_reading(belief, ahead, y_c, belief.weights, most_sds)[0]
         if twin is None or ahead.twin is None:
             return alone
-        other = self._foretold(twin.belief, ahead.twin, y_c, twin.belief.weights)[0]
-        odds = twin.odds - self.hearing.onset_odds
-        share = 0.5 * (1.0 + math.tanh(0.5 * (odds if twin.heated else -odds)))
-        most = max(alone, other)
-        both = (1.0 - share) * math.exp(alone - most) + share * math.exp(other - most)
-        return most + math.log(both)
-
-    def _foretold(
-        self, belief: BankBelief, ahead: Ahead, y_c: float, weights: Weights
-    ) -> tuple[float, Weights]:
-        r"""Return the log likelihood of `y_c`, and what it leaves of the weights.
-
-        It is that of the hypotheses together, with these weights and without a constant:
-        :math:`\ln \sum_j w_j \, S_j^{-1/2} e^{-\min(\nu_j^2/S_j,\,25)/2}`. Where nothing was
-        foreseen, or `y_c` is NaN, it is 0.
-        """
-        block = ahead.block
-        if block is None or not math.isfinite(y_c):
-            return 0.0, weights
-        nu = y_c - block[Z, X]
-        S = block[Z, Z] + belief.noise.believed if ahead.gains is None else ahead.gains.S
-        nis = np.minimum(nu * nu / S, self.hearing.gate_sds**2)
-        log = weights.log - 0.5 * (np.log(S) + nis)
-        most = float(log.max())
-        told = most + math.log(float(np.exp(log - most).sum() * weights.share.max()))
-        return told, weights.after(1.0, nis, S)
+        of = twin.belief
+        other = foretelling.of_reading(of, ahead.twin, y_c, of.weights, most_sds)[0]
+        return foretelling.of_both(alone, other, twin, self.hearing.onset_odds)
 
     def _led(self, belief: BankBelief, ahead: Ahead, after: BankBelief, y_c: float) -> BankBelief:
         """Return `after` or its twin, whichever leads, and for some time the other with it."""
@@ -222,8 +202,9 @@ class Bank:
         assert twin is not None
         assert ahead.twin is not None
         other = self._met(twin.belief, ahead.twin, y_c)
-        alone, weights = self._foretold(belief, ahead, y_c, twin.beside)
-        told, others = self._foretold(twin.belief, ahead.twin, y_c, twin.weights)
+        tell, most_sds = foretelling.of_reading, hearing.gate_sds
+        alone, weights = tell(belief, ahead, y_c, twin.beside, most_sds)
+        told, others = tell(twin.belief, ahead.twin, y_c, twin.weights, most_sds)
         for_heat = told - alone if twin.heated else alone - told
         odds = twin.odds + clamp(for_heat, -hearing.onset_most, hearing.onset_most)
         heat_leads = odds > hearing.onset_odds
@@ -297,7 +278,7 @@ class Bank:
 
     def _seen(self, belief: BankBelief, ahead: Ahead, y_c: float) -> Met:
         """Return what becomes of the prediction when the reading `y_c` meets it."""
-        sample, share, hearing = belief.sample + 1, ahead.excitation.share, self.hearing
+        sample, share = belief.sample + 1, ahead.excitation.share
         drifting, block, m = belief.drifting, ahead.block, belief.weights.likeliest
         nu = math.nan if block is None else y_c - block.item(Z, X, m)
         noise, weights = self._noise(belief, nu, y_c)
@@ -310,54 +291,83 @@ class Bank:
             surprise_k = y_c - float(belief.weights.share.dot(block[Z, X]))
         gains, still = ahead.gains, self._still(share, ahead.unrest)
         S_m = block.item(Z, Z, m) + noise.believed if gains is None else gains.S.item(m)
-        lag = self.hypotheses.lag_s.item(m) / self.period_s
-        gate = self._gated(belief, nu, S_m, hearing.hold_lags * lag)
+        gate = self._gated(belief, nu, S_m)
         if gate.outlier:
             return Met(noise, gate, weights, drifting, 0.0, surprise_k, block)
         if sample >= drifting.silent_until:
-            rest = max(hearing.quiet_lags * lag, QUIET_SAMPLES)
-            drifting = drifting.after(still, nu / math.sqrt(S_m), rest, hearing)
+            drifting = self._drifted(belief, still, nu / math.sqrt(S_m))
         if gate.jumped or drifting.found:
-            R, gains = noise.believed, None
-            block, drifting = self._disturbed(block, gate, nu, R, sample, lag)
+            block, drifting, gains = self._disturbed(belief, block, gate, nu, noise.believed)
         if gains is not None:
             block = filters.followed(block, y_c, gains.K)
             filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
-            return Met(noise, gate, weights, drifting, 0.0, surprise_k, block, gains.older())
-        silent_until = max(EVIDENCE_FROM, gate.silent_until, drifting.silent_until)
-        heard, before = 0.0, block
-        block, nis, S = filters.corrected(before, y_c, noise.believed, self.constants, share)
+            return Met(
+                noise, gate, weights, drifting, 0.0, surprise_k, block, gains.older(kept=True)
+            )
+        heard, before = self._heard(sample, share, noise, gate, drifting), block
+        block, nis, S = filters.corrected(block, y_c, noise.believed, self.constants, share)
         if sample < gate.silent_until:  # what was poured in is colder, and loses less
             filters.grown(block, block[T, X] - before[T, X], self.constants)
         filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
-        if still and sample >= silent_until and not drifting.disturbed:
-            K = filters.gains_at_rest(before, S, self.constants)
-            gains = reckoned(belief.gains, K, S, m)
-        elif sample >= silent_until and belief.gains is not None:
-            gains = belief.gains.older()  # power that moved has left them what they were
-        if share > 0.0 and sample >= silent_until and not (noise.stands or drifting.suspected):
-            heard = share * noise.colour.news
+        if sample >= drifting.silent_until:
+            calm = still and not drifting.disturbed
+            gains = self._gains(belief, before, block, S) if calm else _older(belief.gains)
+        if heard > 0.0:
             weights = weights.after(heard, nis, S)
         elif sample < gate.silent_until and not gate.jumped:
             weights = weights.among_shapes(nis, S)
         return Met(noise, gate, weights, drifting, heard, surprise_k, block, gains)
 
+    def _heard(
+        self, sample: int, share: float, noise: Noise, gate: Gate, drifting: Drifting
+    ) -> float:
+        """Return what the sample counts as evidence for or against the hypotheses."""
+        silent_until = max(EVIDENCE_FROM, gate.silent_until, drifting.silent_until)
+        if sample < silent_until or noise.stands or drifting.suspected:
+            return 0.0
+        return share * noise.colour.news
+
+    def _gains(
+        self, belief: BankBelief, before: filters.Block, block: filters.Block, S: Array
+    ) -> Gains | None:
+        """Return the gains after a full sample of rest, of which `block` is corrected in place.
+
+        It has missed what P did while it was left alone.
+        """
+        gains = _older(belief.gains)
+        if gains is not None and gains.fresh:
+            return gains
+        K = filters.gains_at_rest(before, S, self.constants)
+        if gains is not None and gains.kept and belief.block is not None:
+            K[D] *= filters.caught_up(block, belief.block, gains.kept)
+        return reckoned(gains, K, S, belief.weights.likeliest)
+
+    def _drifted(self, belief: BankBelief, still: bool, sds: float) -> Drifting:
+        """Return the sums after an innovation of so many standard deviations."""
+        rest = max(self.hearing.quiet_lags * self._lag(belief), QUIET_SAMPLES)
+        return belief.drifting.after(still, sds, rest, self.hearing)
+
     def _disturbed(
-        self, block: filters.Block, gate: Gate, nu: float, R: float, sample: int, lag: float
-    ) -> tuple[filters.Block, Drifting]:
-        """Return the block, and how it is heard, of water that has jumped or that drifts."""
+        self, belief: BankBelief, block: filters.Block, gate: Gate, nu: float, R: float
+    ) -> tuple[filters.Block, Drifting, None]:
+        """Return the block of water that has jumped or drifts, how it is heard, and no gains."""
         if gate.jumped:
             block, silent_until = filters.inflated(block, nu, R), gate.silent_until
         else:
             block = filters.reopened(block, self.plants)
-            silent_until = sample + self.hearing.hold_lags * lag
-        return block, Drifting(silent_until=silent_until, disturbed=True)
+            silent_until = belief.sample + 1 + self.hearing.hold_lags * self._lag(belief)
+        return block, Drifting(silent_until=silent_until, disturbed=True), None
 
-    def _gated(self, belief: BankBelief, nu: float, S_m: float, hold: float) -> Gate:
+    def _gated(self, belief: BankBelief, nu: float, S_m: float) -> Gate:
         """Return the gate after a reading that the likeliest missed by `nu`."""
         if belief.noise.samples >= GATE_SAMPLES and nu * nu > self.hearing.gate_sds**2 * S_m:
+            hold = self.hearing.hold_lags * self._lag(belief)
             return belief.gate.beyond(belief.sample + 1, hold)
         return belief.gate.within()
+
+    def _lag(self, belief: BankBelief) -> float:
+        """Return the lag of the likeliest hypothesis, in samples."""
+        return self.hypotheses.lag_s.item(belief.weights.likeliest) / self.period_s
 
     def _noise(self, belief: BankBelief, nu: float, y_c: float) -> tuple[Noise, Weights]:
         """Return the noise after `y_c`, which the likeliest missed by `nu`, and the weights.
@@ -377,10 +387,6 @@ class Bank:
         return noise, belief.weights.tempered(most / noise.colour.most)
 
 
-def _arrivals(hypotheses: Hypotheses, plants: Plants) -> Mapping[int, Array]:
-    """Return, by sample, how much is loosened where the heat has just arrived."""
-    lags = hypotheses.lag_s / hypotheses.period_s
-    samples = np.floor(plants.loosened_lags * lags) + 1.0
-    return {
-        int(sample): plants.loosened_share * (samples == sample) for sample in np.unique(samples)
-    }
+def _older(gains: Gains | None) -> Gains | None:
+    """Return `gains` a full sample later: power that moves for a moment leaves them alone."""
+    return None if gains is None else gains.older(kept=False)

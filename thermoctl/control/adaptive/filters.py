@@ -13,6 +13,7 @@ Implements section 9 of ``docs/theory.md``.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +41,10 @@ GAIN_LEAST = 1e-4
 
 LOSS_MIN, LOSS_MAX = 0.5, 0.95
 """The loss keeps this far below the least and within this share of full power, in gains."""
+
+
+CAUGHT_UP = 0.03
+"""By no more than this share a sample of rest is taken to change what is known of the loss."""
 
 
 class Prior(NamedTuple):
@@ -200,7 +205,7 @@ def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0
 def moved(block: Block, heat: Array, constants: PerPeriod) -> Block:
     """Return the block one period later as `predicted` does, but with P as it is."""
     after = block.copy()
-    water, sensor, d, beta = after[:, X]
+    water, sensor, d, beta = after[T, X], after[Z, X], after[D, X], after[BETA, X]
     warming = _carried(water, sensor, d, beta, heat, constants.step[X], constants.soon[X])
     grown(after, warming, constants)
     return after
@@ -229,6 +234,15 @@ def grown(block: Block, moved_k: Array, constants: PerPeriod) -> None:
     """
     loss = block[D, X]
     loss += np.maximum(loss, 0.0) * np.tanh(moved_k / constants.room_k)
+
+
+def arrivals(hypotheses: Hypotheses, plants: Plants) -> Mapping[int, Array]:
+    """Return, by sample, how much is loosened where the heat has just arrived."""
+    lags = hypotheses.lag_s / hypotheses.period_s
+    samples = np.floor(plants.loosened_lags * lags) + 1.0
+    return {
+        int(sample): plants.loosened_share * (samples == sample) for sample in np.unique(samples)
+    }
 
 
 def loosened(block: Block, heat: Array, spread: Array) -> None:
@@ -296,7 +310,7 @@ def corrected(
 
 
 def followed(block: Block, y_c: float, K: Array) -> Block:
-    """Return the block with the states corrected by the gains `K` after reading `y_c`."""
+    """Return the block after reading `y_c`, the states corrected by the gains `K`."""
     after = block.copy()
     x = after[:, X]
     x += K * (y_c - x[Z])
@@ -304,10 +318,24 @@ def followed(block: Block, y_c: float, K: Array) -> Block:
 
 
 def gains_at_rest(block: Block, S: Array, constants: PerPeriod) -> Array:
-    """Return the gains K, shape (4, n), with which `corrected` at 0 corrects the states."""
+    """Return the gains K of the states, shape (4, n), those of `corrected` at rest."""
     K: Array = block[Z, :X] / S
     K[BETA, _known(block, constants)] = 0.0
     return K
+
+
+def caught_up(block: Block, before: Block, samples: int) -> Array:
+    """Let P go on for `samples` more as it has from `before` to `block`; in place.
+
+    At rest the loss alone is still becoming better known or worse, by some share in every sample.
+    Scaled by the square root of that share in row and column P stays positive and its correlations
+    what they are. Returned is by what the gain of the loss is larger for it, shape (n,).
+    """
+    share = np.minimum(np.maximum(block[D, D] / before[D, D], 1.0 - CAUGHT_UP), 1.0 + CAUGHT_UP)
+    scale: Array = share ** (0.5 * samples)
+    block[D, :X] *= scale
+    block[:, D] *= scale
+    return scale
 
 
 def _known(block: Block, constants: PerPeriod) -> npt.NDArray[np.bool_]:

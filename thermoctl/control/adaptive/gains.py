@@ -1,4 +1,4 @@
-"""Gains of the filters, which at rest are reckoned at every fifteenth sample only.
+"""Gains of the filters: at rest they are reckoned at every fifteenth sample.
 
 The covariance of a Kalman filter does not depend on what is read. In a plant at rest it has come to
 where a reading takes away what a period has added, and the gains are those of the sample before. To
@@ -15,11 +15,11 @@ from typing import NamedTuple
 from thermoctl.control.adaptive.filters import D
 from thermoctl.quantities import Array
 
-KEPT_SAMPLES = 14
-"""For so many samples after the one that reckoned them gains are good."""
-SETTLED = 0.01
-"""Gains have settled when what binds the loss to the reading, K S, changes by no more than this
-share: of all it is the slowest, and R, which wanders, does not count."""
+GOOD_SAMPLES = 14
+"""For so many samples after the one that reckoned them gains are good, once they have settled."""
+SETTLED = 0.05
+"""They have settled when what binds the loss to the reading, K S, has changed by no more than this
+share since they were reckoned before: it is the slowest, and R, which wanders, does not count."""
 
 
 class Gains(NamedTuple):
@@ -31,8 +31,8 @@ class Gains(NamedTuple):
         By how much the states of each go with its innovation.
     S : ndarray, shape (n,)
         Variances of the innovations.
-    age : int
-        Samples since these were reckoned.
+    age, kept : int
+        Samples since these were reckoned, and in how many of them P was left as it was.
     settled : bool
         Whether they are about what they were when reckoned before.
     """
@@ -40,22 +40,23 @@ class Gains(NamedTuple):
     K: Array
     S: Array
     age: int = 0
+    kept: int = 0
     settled: bool = False
 
     @property
-    def lasting(self) -> bool:
-        """Whether they may be kept for another sample of rest."""
-        return self.settled and self.age < KEPT_SAMPLES
+    def fresh(self) -> bool:
+        """Whether they need not be reckoned yet."""
+        return self.age < GOOD_SAMPLES
 
-    def older(self) -> Gains:
-        """Return the same, a sample later."""
-        return Gains(self.K, self.S, self.age + 1, self.settled)
+    def older(self, *, kept: bool) -> Gains:
+        """Return the same, a sample later in which P was `kept` or not."""
+        return Gains(self.K, self.S, self.age + 1, self.kept + kept, self.settled)
 
 
 def reckoned(before: Gains | None, K: Array, S: Array, likeliest: int) -> Gains:
-    """Return the gains of a sample of rest; `before` are those of the last one."""
+    """Return the gains of a sample of rest, after those that were reckoned `before`."""
     if before is None:
         return Gains(K, S)
     now = K.item(D, likeliest) * S.item(likeliest)
     then = before.K.item(D, likeliest) * before.S.item(likeliest)
-    return Gains(K, S, 0, abs(now - then) <= SETTLED * abs(now))
+    return Gains(K, S, 0, 0, abs(now - then) <= SETTLED * abs(now))

@@ -45,7 +45,7 @@ def at_rest(hypotheses: Hypotheses, power: float = 0.0) -> Path:
 
 def pushed(path: Path, hypotheses: Hypotheses, power: float) -> Path:
     """Return the path one period later, during which `power` was applied."""
-    powers = np.empty_like(path.powers)
+    powers = np.empty(len(path.powers))
     powers[0] = power
     powers[1:] = path.powers[:-1]
     entering = powers[hypotheses.dead]  # u[k-1-nd], into the heater

@@ -1,4 +1,4 @@
-"""A loop that heats by the temperature of a block, watched by the heat that flows.
+"""A loop that heats by the temperature of a block, watched by its flow of heat.
 
 What such a loop calls power is where the block stands between two temperatures. A bath as warm as
 the block gets no heat at all, and that is rarely at power 0: in a bath of 37 °C a block never

@@ -1,0 +1,46 @@
+"""How likely a reading was, before it was seen.
+
+Implements section 9 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from thermoctl.control.adaptive.bank_belief import Ahead, BankBelief, Twin
+from thermoctl.control.adaptive.evidence import Weights
+from thermoctl.control.adaptive.filters import X, Z
+
+
+def of_reading(
+    belief: BankBelief, ahead: Ahead, y_c: float, weights: Weights, most_sds: float
+) -> tuple[float, Weights]:
+    r"""Return the log likelihood of `y_c`, and what it leaves of the weights.
+
+    It is that of the hypotheses together, with these weights and without a constant:
+    :math:`\ln \sum_j w_j \, S_j^{-1/2} e^{-\min(\nu_j^2/S_j,\,m^2)/2}`, where m is `most_sds`.
+    Where nothing was foreseen, or `y_c` is NaN, it is 0.
+    """
+    block, gains = ahead.block, ahead.gains
+    if block is None or not math.isfinite(y_c):
+        return 0.0, weights
+    nu = y_c - block[Z, X]
+    S = block[Z, Z] + belief.noise.believed if gains is None else gains.S
+    nis = np.minimum(nu * nu / S, most_sds**2)
+    log = weights.log - 0.5 * (np.log(S) + nis)
+    most = float(log.max())
+    told = most + math.log(float(np.exp(log - most).sum() * weights.share.max()))
+    return told, weights.after(1.0, nis, S)
+
+
+def of_both(alone: float, other: float, twin: Twin, onset_odds: float) -> float:
+    """Return the log likelihood of two that are as likely as the odds of `twin` say.
+
+    `other` is that of the twin; beyond `onset_odds` there was heat.
+    """
+    odds = twin.odds - onset_odds
+    share = 0.5 * (1.0 + math.tanh(0.5 * (odds if twin.heated else -odds)))
+    most = max(alone, other)
+    return most + math.log((1.0 - share) * math.exp(alone - most) + share * math.exp(other - most))
