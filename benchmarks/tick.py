@@ -24,13 +24,25 @@ def spread(values: list[float]) -> str:
     return f"{statistics.median(values):8.2f}  ({min(values):.2f} to {max(values):.2f})"
 
 
-def ticks_us(name: str) -> list[float]:
-    """Return the median CPU time of a regulator's step in us, once a run."""
+def ticks_us(name: str, *, shadow: bool) -> tuple[list[float], list[float]]:
+    """Return medians of the CPU time of a step in us, once a run: in the first hour, from cold.
+
+    And in the second one, at rest. With the law that the profile has in its shadow, or without.
+    """
     settings = bench_settings(profile(name))
-    return [
-        statistics.median(cycle.tick_us for cycle in simulate(settings, HOUR_S))
-        for _ in range(RUNS)
-    ]
+    if not shadow:
+        alone = {
+            loop: table.model_copy(update={"shadow": None})
+            for loop, table in settings.loops.items()
+        }
+        settings = settings.model_copy(update={"loops": alone})
+    first, second = [], []
+    for _ in range(RUNS):
+        taken = [cycle.tick_us for cycle in simulate(settings, 2.0 * HOUR_S)]
+        half = len(taken) // 2
+        first.append(statistics.median(taken[:half]))
+        second.append(statistics.median(taken[half:]))
+    return first, second
 
 
 def seconds(work: Callable[[], None]) -> list[float]:
@@ -59,8 +71,11 @@ def hour_with_lines() -> None:
 def main() -> None:
     """Print the table."""
     print(f"medians of {RUNS} runs, with their range")
-    for name in ("aquarium", "ozbek2021"):
-        print(f"regulator step, {name:<28} us {spread(ticks_us(name))}")
+    for name, shadow in (("aquarium", False), ("aquarium", True), ("ozbek2021", False)):
+        cold, rest = ticks_us(name, shadow=shadow)
+        beside = ", with a shadow" if shadow else ""
+        print(f"regulator step, {name + beside:<28} us {spread(cold)}, from cold")
+        print(f"{'':<44} us {spread(rest)}, at rest")
     print(f"simulated hour with plant                  s {spread(seconds(hour))}")
     print(f"simulated hour with plant and JSON lines   s {spread(seconds(hour_with_lines))}")
 

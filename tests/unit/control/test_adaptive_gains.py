@@ -8,7 +8,7 @@ import pytest
 
 from thermoctl.control.adaptive import gains
 from thermoctl.control.adaptive.bank import Bank
-from thermoctl.control.adaptive.filters import X
+from thermoctl.control.adaptive.filters import D, X
 
 BANK = Bank()
 HELD = 0.25
@@ -56,10 +56,16 @@ def test_no_gain_is_kept_before_the_plant_has_come_to_rest(rested):
     assert not any(kept(before, after) for before, after in pairwise(rested[:180]))
 
 
+def loss_sd(belief):
+    """Return how well the loss is known, in K per sample."""
+    return math.sqrt(belief.weights.share.dot(belief.block[D, D]))
+
+
 def test_what_is_believed_is_what_it_would_be_were_they_reckoned_always(rested, monkeypatch):
     monkeypatch.setattr(gains, "GOOD_SAMPLES", 0)
     always = run(powers())
     for believed, exact in zip(rested, always, strict=True):
+        assert loss_sd(believed) == pytest.approx(loss_sd(exact), rel=0.05)
         assert believed.outlook.coasting_c == pytest.approx(exact.outlook.coasting_c, abs=2e-3)
         assert believed.outlook.holding_power == pytest.approx(
             exact.outlook.holding_power, abs=2e-3
