@@ -3,6 +3,8 @@
 import numpy as np
 
 from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.known import KnownHeater
+from thermoctl.regulator.heater.response import Gain
 from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor
@@ -29,3 +31,14 @@ def test_a_rise_before_the_power_went_is_no_rise_without_power():
         applied = 0.0 if watch.asks or supervisor.state is not State.RUN else asked
     assert "heater.questioned" in told
     assert "heater.stuck_on" not in told
+
+
+def test_a_heater_of_which_more_was_needed_has_not_become_stronger():
+    known = KnownHeater()
+    known.recall(Gain(0.01, 0.001, 3))
+    known.accept(Gain(0.03, 0.001, 3), more=False)  # the door has just been opened
+    assert known.gain.mean == 0.01
+    known.accept(Gain(0.004, 0.0003, 3), more=False)
+    assert known.gain.mean == 0.004
+    known.accept(Gain(0.01, 0.001, 3))
+    assert known.gain.mean == 0.01

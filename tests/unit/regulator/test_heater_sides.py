@@ -112,6 +112,17 @@ def test_a_sensor_that_hangs_in_the_air_latches_on_either_side(held_c):
     assert abs(tank.water_c - began_c) < 10.0
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_reading_that_stops_is_missed_though_noise_is_more_than_the_cooler_does_in_a_block(seed):
+    tank = Tank(seed, noise_k=0.06).hold(30.0, 900).hold(15.0, 4800)
+    assert tank.supervisor.state is State.RUN
+    tank.shows = lambda water_c: 22.0
+    began_c = tank.water_c
+    tank.hold(15.0, 1800)
+    assert tank.supervisor.state is State.LATCHED
+    assert began_c - tank.water_c < 6.0
+
+
 def test_what_the_other_one_does_is_neither_missed_nor_learnt():
     tank = known()
     before, rows = tank.watch.heater.known, len(tank.watch.heater._rows)

@@ -49,6 +49,10 @@ COOLED_S = 100.0
 what goes on rising is in order."""
 MEMORY_S, MEMORY_LAGS = 300.0, 10.0
 """Memory of the quiet rates."""
+SHOWS_SDS = 6.0
+"""Blocks are taken together until full power would move the reading by so many standard deviations.
+What a block may count is bounded by its heat, and noise that is cut off on that side alone hides
+for ever that a reading has stopped, where a weak cooler moves it by less than the noise."""
 FOLLOWS_SDS = 4.0
 """They follow a rise beyond what full power does by noise of so many standard deviations: cut off,
 noise would no longer add up to nothing."""
@@ -103,12 +107,15 @@ class HeatDoubt:
         self._answered_s = 0.0
         self._cools_per_s = self._cools_loss = self._cools_s = 0.0
         self.since: Seen | None = None
+        self._begin: Seen | None = None  # of what is taken together
+        self._jumped = False
         self.clear()
 
     def clear(self) -> None:
         """Begin the sums anew; what is known of the quiet plant stays."""
         self._missing_k = self._extra_k = self._crept_s = 0.0
-        self.since = None
+        self.since = self._begin = None
+        self._jumped = False
 
     def trust(self) -> None:
         """Take the loss for what it is now: the heater was asked, and answers."""
@@ -185,6 +192,12 @@ class HeatDoubt:
         rise that is left by the loss, not of the heat, half may be missing. So it is where the loss
         is large, of a heater that is `proven` to obey less power.
         """
+        before = before if self._begin is None else self._begin
+        self._jumped = jumped = self._jumped or jumped
+        if gain.mean * (now.t_s - before.t_s) < SHOWS_SDS * block.sd_k:
+            self._begin = before
+            return
+        self._begin, self._jumped = None, False
         span_s, rise_k = now.t_s - before.t_s, now.reading_c - before.reading_c
         heat_k = gain.mean * (now.heat_s[gain.place] - before.heat_s[gain.place])
         full_k = gain.mean * span_s

@@ -119,13 +119,17 @@ class KnownHeater:
         self._outdone_k = max(0.0, self._outdone_k + now.reading_c - before.reading_c - most_k)
         return self._outdone_k > max(LEAST_K, SDS * sd_k)
 
-    def accept(self, shown: Gain) -> None:
-        """Take for known what an answer has `shown`, if that is news."""
+    def accept(self, shown: Gain, *, more: bool = True) -> None:
+        """Take for known what an answer has `shown`, if that is news.
+
+        Not `more` than is known where it was asked for want of heat: a heater of which more was
+        needed has not become stronger, and a load that has just begun makes it look so.
+        """
         known = self.gain
         if known is None or shown.mean < CHANGED * known.mean:
             cools_per_s = 0.0 if known is None else known.cools_per_s
             known = shown._replace(cools_per_s=cools_per_s)
-        elif shown.mean > known.mean / CHANGED:
+        elif more and shown.mean > known.mean / CHANGED:
             known = known._replace(mean=min(shown.mean, AT_ONCE * known.mean))
         self._obeys = self._obeys and not self.recalled  # an answer does not show the lag
         self.gain, self.recalled = known, False

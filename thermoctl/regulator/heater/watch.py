@@ -338,7 +338,7 @@ class HeaterWatch:
         if shown is self.known:  # not by the question alone
             text = _LOAD_TEXT.format(asked_s)
         self._emit("heater.answered", text=text)
-        self._heater.accept(shown)
+        self._heater.accept(shown, more=self._cut is None or self._cut.began_s is None)
         self._trial.begin(self._t_s)
         self._distrusted_k = 0.0
         self._trust()
