@@ -192,19 +192,16 @@ class HeatDoubt:
         rise that is left by the loss, not of the heat, half may be missing. So it is where the loss
         is large, of a heater that is `proven` to obey less power.
         """
-        before = before if self._begin is None else self._begin
-        self._jumped = jumped = self._jumped or jumped
+        before, jumped = self._together(before, jumped=jumped)
         if gain.mean * (now.t_s - before.t_s) < SHOWS_SDS * block.sd_k:
-            self._begin = before
+            self._begin, self._jumped = before, jumped
             return
-        self._begin, self._jumped = None, False
         span_s, rise_k = now.t_s - before.t_s, now.reading_c - before.reading_c
         heat_k = gain.mean * (now.heat_s[gain.place] - before.heat_s[gain.place])
         full_k = gain.mean * span_s
         self._coldest_c = min(self._coldest_c, now.reading_c)
         self._cool(gain, span_s)
-        loss_k = self.loss(gain) * span_s
-        loss_k += self._unseen(gain, now.reading_c) * span_s
+        loss_k = (self.loss(gain) + self._unseen(gain, now.reading_c)) * span_s
         self._answered_s -= span_s
         large = proven and self._answered_s <= 0.0 and loss_k > MUCH_SHARE * full_k
         missing_k = self._missing_k - FULL_SHARE * full_k
@@ -223,6 +220,13 @@ class HeatDoubt:
         if not again:  # what it needed is what it was asked about
             self._need(gain, before, now)
         self._creep(gain, now.reading_c, span_s, block.sd_k)
+
+    def _together(self, before: Seen, *, jumped: bool) -> tuple[Seen, bool]:
+        """Return where what is taken together begins, and whether it jumped; forget it."""
+        if self._begin is not None:
+            before, jumped = self._begin, self._jumped or jumped
+        self._begin, self._jumped = None, False
+        return before, jumped
 
     def _unseen(self, gain: Gain, reading_c: float) -> float:
         """Return what a loss may have grown, or has surely shrunk, by since it was learnt."""
