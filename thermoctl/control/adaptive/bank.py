@@ -221,9 +221,9 @@ class Bank:
         if belief.block is None and not seen:
             return belief._replace(path=way, excitation=ahead.excitation)
         met = self._seen(belief, ahead, y_c) if seen else self._unseen(belief, ahead)
-        gains, weights = met.gains, met.weights
-        same = gains is not None and gains.age > 0 and weights is belief.weights
-        before = belief.outlook if same else None
+        weights = met.weights
+        kept = ahead.gains is not None and met.gains is not None and weights is belief.weights
+        before = belief.outlook if kept else None
         view = outlook(met.block, way, weights.share, self.hypotheses, self.constants, before)
         if not math.isfinite(np.vdot(met.block, met.block) + view.coasting_c):
             raise ArithmeticError(f"expected a finite belief after {y_c!r} degC")
@@ -300,7 +300,7 @@ class Bank:
             block, drifting, gains = self._disturbed(belief, block, gate, nu, noise.believed)
         if gains is not None:
             block = filters.followed(block, y_c, gains.K)
-            filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
+            self._limit_loss(block, sample)
             return Met(
                 noise, gate, weights, drifting, 0.0, surprise_k, block, gains.older(kept=True)
             )
@@ -308,15 +308,20 @@ class Bank:
         block, nis, S = filters.corrected(block, y_c, noise.believed, self.constants, share)
         if sample < gate.silent_until:  # what was poured in is colder, and loses less
             filters.grown(block, block[T, X] - before[T, X], self.constants)
-        filters.project(block, self.constants, loss=sample * self.period_s > LOSS_FROM_S)
-        if sample >= drifting.silent_until:
-            calm = still and not drifting.disturbed
-            gains = self._gains(belief, before, block, S) if calm else _older(belief.gains)
+        filters.limit_gain(block, self.constants)
+        self._limit_loss(block, sample)
+        calm = still and not drifting.disturbed and sample >= drifting.silent_until
+        gains = self._gains(belief, before, block, S) if calm else _older(belief.gains)
         if heard > 0.0:
             weights = weights.after(heard, nis, S)
         elif sample < gate.silent_until and not gate.jumped:
             weights = weights.among_shapes(nis, S)
         return Met(noise, gate, weights, drifting, heard, surprise_k, block, gains)
+
+    def _limit_loss(self, block: filters.Block, sample: int) -> None:
+        """Limit the loss as soon as the gain is known, in place."""
+        if sample * self.period_s > LOSS_FROM_S:
+            filters.limit_loss(block, self.constants)
 
     def _heard(
         self, sample: int, share: float, noise: Noise, gate: Gate, drifting: Drifting
@@ -337,7 +342,7 @@ class Bank:
         gains = _older(belief.gains)
         if gains is not None and gains.fresh:
             return gains
-        K = filters.gains_at_rest(before, S, self.constants)
+        K = filters.gains_at_rest(before, S)
         if gains is not None and gains.kept and belief.block is not None:
             K[D] *= filters.caught_up(block, belief.block, gains.kept)
         return reckoned(gains, K, S, belief.weights.likeliest)

@@ -17,7 +17,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from thermoctl.control.adaptive.constants import Plants
 from thermoctl.control.adaptive.hypotheses import Hypotheses
@@ -302,7 +301,9 @@ def corrected(
     g /= np.sqrt(S)  # P H' / sqrt S, and beside it -nu / sqrt S
     after = g[:X, None] * g
     if proof < 1.0:  # of beta K = p g / sqrt S: Joseph's form differs from P - g g' here alone
-        known, P, x = _known(block, constants), after[BETA, BETA], after[BETA, X]
+        most = constants.known_share * block[BETA, X]
+        most *= most
+        known, P, x = block[BETA, BETA] <= most, after[BETA, BETA], after[BETA, X]
         np.multiply(P, proof * (2.0 - proof), out=P, where=known)
         np.multiply(x, proof, out=x, where=known)
     np.subtract(block, after, out=after)  # P - g g', x + g nu / sqrt S
@@ -310,17 +311,16 @@ def corrected(
 
 
 def followed(block: Block, y_c: float, K: Array) -> Block:
-    """Return the block after reading `y_c`, the states corrected by the gains `K`."""
+    """Return the block after reading `y_c`, the states but for beta corrected by `K`."""
     after = block.copy()
-    x = after[:, X]
+    x = after[:BETA, X]
     x += K * (y_c - x[Z])
     return after
 
 
-def gains_at_rest(block: Block, S: Array, constants: PerPeriod) -> Array:
-    """Return the gains K of the states, shape (4, n), those of `corrected` at rest."""
-    K: Array = block[Z, :X] / S
-    K[BETA, _known(block, constants)] = 0.0
+def gains_at_rest(block: Block, S: Array) -> Array:
+    """Return the gains K of water, sensor and loss, shape (3, n)."""
+    K: Array = block[Z, :BETA] / S
     return K
 
 
@@ -338,20 +338,15 @@ def caught_up(block: Block, before: Block, samples: int) -> Array:
     return scale
 
 
-def _known(block: Block, constants: PerPeriod) -> npt.NDArray[np.bool_]:
-    """Return of which hypotheses the gain beta is known, shape (n,)."""
-    most = constants.known_share * block[BETA, X]
-    most *= most
-    known: npt.NDArray[np.bool_] = block[BETA, BETA] <= most
-    return known
-
-
-def project(block: Block, constants: PerPeriod, *, loss: bool) -> None:
-    """Limit gain, and `loss` too, of a new block to what a plant can have; in place."""
+def limit_gain(block: Block, constants: PerPeriod) -> None:
+    """Limit the gain of a new block to what a plant can have, in place."""
     beta = block[BETA, X]
     np.maximum(beta, constants.gain_min, out=beta)
     np.minimum(beta, constants.gain_max, out=beta)
-    if loss:
-        d = block[D, X]
-        np.maximum(d, constants.loss_min * beta, out=d)
-        np.minimum(d, constants.loss_max * beta, out=d)
+
+
+def limit_loss(block: Block, constants: PerPeriod) -> None:
+    """Limit the loss of a new block to what a plant of its gain can have, in place."""
+    d, beta = block[D, X], block[BETA, X]
+    np.maximum(d, constants.loss_min * beta, out=d)
+    np.minimum(d, constants.loss_max * beta, out=d)

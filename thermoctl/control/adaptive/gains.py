@@ -27,8 +27,9 @@ class Gains(NamedTuple):
 
     Parameters
     ----------
-    K : ndarray, shape (4, n)
-        By how much the states of each go with its innovation.
+    K : ndarray, shape (3, n)
+        By how much water, sensor and loss of each go with its innovation. What a gain is, rest does
+        not show.
     S : ndarray, shape (n,)
         Variances of the innovations.
     age, kept : int
