@@ -74,7 +74,8 @@ class Wanted:
 
     `ramp_s` is how long the reference is still on its way there; `power_cools` says what power does
     where it is wired as it should be. `led`: it is another loop that wants it, and never all of it
-    at once: nothing is told of such a set point.
+    at once: nothing is told of such a set point. `ceiling_c` is what the plant was seen to come to,
+    and not to pass for all its power.
     """
 
     setpoint_c: float
@@ -83,11 +84,18 @@ class Wanted:
     ramp_s: float = 0.0
     power_cools: bool = False
     led: bool = False
+    ceiling_c: float = math.nan
 
     @property
     def counts(self) -> bool:
         """Whether anybody is told that it cannot be held."""
         return self.mode is Mode.AUTO and not self.led
+
+    @property
+    def beyond_ceiling(self) -> bool:
+        """Whether the plant has been seen not to come near the set point."""
+        beyond_k = self.setpoint_c - self.ceiling_c
+        return (-beyond_k if self.power_cools else beyond_k) > BEYOND_K
 
 
 class Standing:
@@ -238,6 +246,8 @@ class Feasibility:
         held = heat_loss.holding(belief, wanted.setpoint_c)
         holding = self._settling.doubted(held, wanted.setpoint_c, t_s)
         highest = _within(heat_loss.reach(belief, wanted.power_max), SD_MOST_K)
+        if wanted.beyond_ceiling:
+            highest = Known(wanted.ceiling_c, ARRIVED_K)
         arrival = self._slip.doubted(self._arrival(belief, wanted, holding), wanted.setpoint_c, t_s)
         arrival = _within(arrival, arrival.mean + self._lag_s)
         return Feasible(*_within(holding, POWER_SD_MOST), *highest, *arrival)
@@ -320,6 +330,8 @@ def _missing_sds(belief: HeatBelief, wanted: Wanted, full: bool) -> float:
     That is the better of two ways to be sure: by the slope that was learnt, and by how slowly the
     plant still moves, which also tells of one that stands at its limit from the start.
     """
+    if wanted.beyond_ceiling:
+        return math.inf
     here_c = belief.x[heat_loss.T]
     way_k = wanted.setpoint_c - here_c
     towards = math.copysign(1.0, way_k)

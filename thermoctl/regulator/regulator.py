@@ -308,6 +308,7 @@ class Regulator:
             wishes.ramp_s,
             limits.power_cools,
             wishes.led,
+            math.nan if self._watch is None else self._watch.ceiling_c,
         )
 
     def _jump_for(self, beliefs: Beliefs) -> float:

@@ -48,6 +48,11 @@ class Sides:
         """Whether power has to be 0 now, for the sake of a question."""
         return self.heater.asks or self.cooler.asks
 
+    @property
+    def ceiling_c(self) -> float:
+        """Reading in degC that all the power does not pass; NaN before one was seen."""
+        return self.heater.ceiling_c
+
     def observe(self, t_s: float, interval_s: float, reading_c: float, applied: float) -> None:
         """Show the last interval and the reading at its end to whoever it concerns."""
         acts = int(applied > OFF) - int(applied < -OFF)

@@ -11,8 +11,9 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from thermoctl.regulator.heater import climb, evidence, question, trial
+from thermoctl.regulator.heater import ceiling, climb, evidence, fall, hearing, question, trial
 from thermoctl.regulator.heater.blocks import Blocks, Repeats
+from thermoctl.regulator.heater.ceiling import Ceiling
 from thermoctl.regulator.heater.check import HeaterCheck, Reacts
 from thermoctl.regulator.heater.climb import Climb
 from thermoctl.regulator.heater.cut import Cut
@@ -27,29 +28,11 @@ OFF = 0.01
 """Power below this is none."""
 RISES = 0.3
 """A reading that rises by so much of what full power does, without any, is heated all the same."""
-HEARD_S, HEARD_LAGS = 20.0, 0.5
-"""A good answer is believed from then on, of a heater that is not known, and of one that is;"""
-BAD_S, BAD_LAGS = 60.0, 2.0
-"""a bad one from then on."""
-WILD, RESTS = 1.3, 0.5
-"""A reading that falls faster than a heater which cools this much better than it heated: ice in the
-water, or a sensor in the air. What follows the cut is then no answer; it is over at the second.
-That nothing explains the fall is no answer either: the next heat has to be answered, and soon."""
-WILD_S = 60.0
-"""Such a fall is a doubt as soon as after a bad answer, once it lasts longer than water mixes."""
 LATELY_S = 1800.0
 """A second verdict within this time latches."""
 ROWS = 450
 """Blocks that are remembered: half an hour at a second's period."""
 
-_LIKELY_TEXT = "{:.0f} s without power do not show it surely, but a gain of {:.2g} K/s is likely"
-_WILD_TEXT = (
-    "the reading fell faster than any heater can make it: the next heat is what it is asked by"
-)
-_LOAD_TEXT = (
-    "after {:.0f} s without power a load explains why more was needed, a dead heater does not"
-)
-_HIDDEN_TEXT = "{:.0f} s without power show less than a load that comes and goes may hide"
 _FAULTS = {"heater.no_response": 23, "heater.reversed": 3, "heater.stuck_on": 24}
 
 
@@ -71,11 +54,12 @@ class HeaterWatch:
     def __init__(self, check: HeaterCheck, period_s: float, supervisor: Reacts, emit: Emit) -> None:
         self._weakest = check.weakest_k_per_s
         self._unknown_s = max(60.0, 10.0 * period_s)
-        self._blocks = Blocks(period_s, 1.0 if check.action == "heat" else -1.0)
+        self._sign = 1.0 if check.action == "heat" else -1.0
+        self._blocks = Blocks(period_s, self._sign)
         self._repeats = Repeats()
         self._response, self._doubt, self._climb = HeatResponse(), HeatDoubt(), Climb()
         self._supervisor, self._emit = supervisor, emit
-        self._heater, self._trial = KnownHeater(), Trial(check)
+        self._heater, self._trial, self._ceiling = KnownHeater(), Trial(check), Ceiling()
         self._settled_s = 0.0  # from then on, what was on its way at the start has arrived
         self._rows: deque[Seen] = deque(maxlen=ROWS)
         self._cut: Cut | None = None
@@ -92,6 +76,11 @@ class HeaterWatch:
     def known(self) -> Gain | None:
         """What is known of the heater, once it is."""
         return self._heater.gain
+
+    @property
+    def ceiling_c(self) -> float:
+        """Reading in degC that all the power does not pass; NaN before one was seen."""
+        return self._sign * self._ceiling.level_c if self._ceiling.known else math.nan
 
     def recall(self, known: Gain) -> None:
         """Begin with what an earlier run knew; in the end this one learns it."""
@@ -132,6 +121,7 @@ class HeaterWatch:
 
     def _lose_track(self) -> None:
         """After a long gap nobody knows what was applied."""
+        self._ceiling.clear()
         self._climb.clear()
         self._blocks.clear()
         self._response.begin_again()
@@ -147,8 +137,9 @@ class HeaterWatch:
         known, sd_k = self._heater.gain, block.sd_k
         self._t_s += block.span_s
         self._off_s = self._off_s + block.span_s if block.power < OFF else 0.0
+        there = self._ceiling.holds(block)
         trusted = self._cut is None and self._distrusted_k <= 0.0 and self._climb.calm(sd_k)
-        learns = trusted and (known is None or self._doubt.calm(known, sd_k))
+        learns = trusted and not there and (known is None or self._doubt.calm(known, sd_k))
         self._response.observe(block, learn=learns)
         if self._response.retracted and self._heater.retract():
             self._trial.begin(self._t_s)
@@ -158,8 +149,14 @@ class HeaterWatch:
         before = self._rows[-1] if self._rows else None
         now = Seen(self._t_s, block.reading_c, self._response.heat_s)
         self._rows.append(now)
+        if known is not None and self._ceiling.found(self._rows, known, now, sd_k):
+            self._withdraw()
         if self._cut is not None:
             self._hear(self._cut, block, now, t_s)
+            return
+        if there:
+            self._climb.pause()
+            self._doubt.clear()
             return
         if learns and (self.known is not None or now.reading_c > self._refused_c):
             self._heater.learn(self._response.gain, now, self._response.moved_k, sd_k)
@@ -175,9 +172,18 @@ class HeaterWatch:
         if known is not None and settled and self._cut is None and before is not None:
             self._compare(known, block, before, now, t_s)
 
+    def _withdraw(self) -> None:
+        """Take a bad answer back, or a doubt: the plant gets no warmer."""
+        if self._cut is not None or self._distrusted_k > 0.0:
+            self._emit("heater.answered", text=ceiling.TEXT.format(self.ceiling_c))
+        self._trial.begin(self._t_s)
+        self._failed_s, self._distrusted_k = -math.inf, 0.0
+        self._trust()
+
     def _disown(self, now: Seen) -> None:
         """Go on with a heater that nobody knows: what was remembered is of another plant."""
         self._heater.forget()
+        self._ceiling.clear()
         self._doubt, self._distrusted_k = HeatDoubt(), 0.0
         self._trial.begin(now.t_s)
 
@@ -223,8 +229,8 @@ class HeaterWatch:
             lags = CREPT_LAGS if doubt.crept else BEFORE_LAGS
             from_s = self._t_s - max(lags * known.lag_s, BEFORE_S)
             since_s = from_s if doubt.since is None else min(doubt.since.t_s, from_s)
-            wild = self._wild(known, since_s, WILD) or self._wild(known, from_s, WILD)
-            lasts = wild and self._t_s - since_s >= max(BEFORE_LAGS * known.lag_s, WILD_S)
+            wild = fall.wild(self._rows, (since_s, from_s), known, doubt.loss(known))
+            lasts = wild and self._t_s - since_s >= max(BEFORE_LAGS * known.lag_s, fall.WILD_S)
             if hot or lasts or doubt.cold(known, sd_k, again=again):
                 began_s = None if hot or wild else since_s
                 self._ask(Cut(now.t_s, from_s, doubt.told(known, now), wild, began_s))
@@ -247,6 +253,8 @@ class HeaterWatch:
 
     def _ask(self, cut: Cut) -> None:
         self._cut = cut
+        if self._heater.gain is not None:
+            self._ceiling.follow(self._rows, self._heater.gain, cut.at_s)
         self._emit("heater.questioned", text=f"{cut.why}; power is cut to see what it does")
 
     def _hear(self, cut: Cut, block: Block, now: Seen, t_s: float) -> None:
@@ -257,16 +265,16 @@ class HeaterWatch:
         answer, shown = self._answer(cut, block.sd_k)
         if known is None and answer is Answer.HEATS and not arrived(shown, now):
             answer = Answer.OPEN  # what wanders in the air is as long as the longest lags
-        heard_s = HEARD_S if known is None else HEARD_LAGS * lag_s
-        bad_s = BAD_S if known is None else BAD_LAGS * lag_s
+        heard_s, bad_s = hearing.believed_s(known, lag_s)
         if answer is Answer.HEATS:
             if asked_s >= heard_s:
                 self._accept(shown, asked_s)
         elif asked_s < bad_s:
             return
         elif known is not None and cut.wild:
-            if not self._wild(known, now.t_s - max(lag_s, BEFORE_S), RESTS):
-                self._emit("heater.answered", text=_WILD_TEXT)
+            from_s = now.t_s - max(lag_s, BEFORE_S)
+            if fall.over(self._rows, from_s, known, self._doubt.loss(known)):
+                self._emit("heater.answered", text=fall.OVER)
                 self._suspect(known)
         elif answer is Answer.HIDDEN:
             self._leave_open(asked_s)
@@ -275,7 +283,7 @@ class HeaterWatch:
         elif known is not None and asked_s > question.longest_s(known, block.sd_k):
             answer, shown = self._answer(cut, block.sd_k, question.LIKELY)
             if answer is Answer.HEATS:
-                self._emit("heater.answered", text=_LIKELY_TEXT.format(asked_s, shown.mean))
+                self._emit("heater.answered", text=hearing.LIKELY.format(asked_s, shown.mean))
                 self._trust()
             elif answer is Answer.HIDDEN:
                 self._leave_open(asked_s)
@@ -291,22 +299,14 @@ class HeaterWatch:
 
     def _leave_open(self, asked_s: float) -> None:
         """Go on: what is in doubt is the moment of the cut, and another one tells."""
-        self._emit("heater.answered", text=_HIDDEN_TEXT.format(asked_s))
+        self._emit("heater.answered", text=hearing.HIDDEN.format(asked_s))
         self._go_on()
 
     def _answer(self, cut: Cut, sd_k: float, sure: float = question.SURE) -> tuple[Answer, Gain]:
         """Return what the reading says so far, and the gain it shows."""
         known, climbed = self._heater.gain, climb.SHOWS * self._climb.shown
         if known is not None:
-            answer, shown = question.of_known_rows(
-                self._rows, cut.from_s, cut.at_s, known, sd_k, sure
-            )
-            late = sure < question.SURE
-            if cut.began_s is None or (answer is Answer.HEATS and not late):
-                return answer, shown
-            odds = evidence.odds(self._rows, cut.began_s, known, sd_k)
-            answer = evidence.weigh(answer, odds, crept=cut.crept, late=late)
-            return answer, known if odds > evidence.SOUND else shown
+            return hearing.answer(self._rows, cut, known, sd_k, sure)
         weakest, froms_s = max(self._weakest, climbed), [cut.from_s]
         if not climbed:  # what has climbed may have failed since
             froms_s += [self._trial.since_s, -math.inf]
@@ -327,16 +327,11 @@ class HeaterWatch:
         from_s = now.t_s - min(max(OFF_LAGS * known.lag_s, BEFORE_S), self._off_s)
         return question.slope(self._rows, from_s, less_sd_k=sd_k)
 
-    def _wild(self, known: Gain, from_s: float, gains: float) -> bool:
-        """Return whether the reading fell faster than loss and so many `gains` together."""
-        fell = -question.slope(self._rows, from_s)
-        return fell > max(self._doubt.loss(known), 0.0) + gains * known.mean
-
     def _accept(self, shown: Gain, asked_s: float) -> None:
         """Go on with a heater that heats, and with the gain it has shown if that is news."""
         text = f"{asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s"
         if shown is self.known:  # not by the question alone
-            text = _LOAD_TEXT.format(asked_s)
+            text = hearing.LOAD.format(asked_s)
         self._emit("heater.answered", text=text)
         self._heater.accept(shown, more=self._cut is None or self._cut.began_s is None)
         self._trial.begin(self._t_s)

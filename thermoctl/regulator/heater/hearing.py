@@ -1,0 +1,57 @@
+"""What is made of an answer, and from when on it is believed.
+
+`question` reads it off the readings around the cut alone. Where a load may have given it,
+`evidence` weighs in all that was seen since the doubt began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from thermoctl.regulator.heater import evidence, question
+from thermoctl.regulator.heater.cut import Cut
+from thermoctl.regulator.heater.doubt import Seen
+from thermoctl.regulator.heater.question import Answer
+from thermoctl.regulator.heater.response import Gain
+
+HEARD_S, HEARD_LAGS = 20.0, 0.5
+"""A good answer is believed from then on, of a heater that is not known, and of one that is;"""
+BAD_S, BAD_LAGS = 60.0, 2.0
+"""a bad one from then on."""
+LIKELY = "{:.0f} s without power do not show it surely, but a gain of {:.2g} K/s is likely"
+LOAD = "after {:.0f} s without power a load explains why more was needed, a dead heater does not"
+HIDDEN = "{:.0f} s without power show less than a load that comes and goes may hide"
+
+
+def believed_s(known: Gain | None, lag_s: float) -> tuple[float, float]:
+    """Return from when on a good answer is believed, and a bad one."""
+    if known is None:
+        return HEARD_S, BAD_S
+    return HEARD_LAGS * lag_s, BAD_LAGS * lag_s
+
+
+def answer(
+    rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float, sure: float = question.SURE
+) -> tuple[Answer, Gain]:
+    """Return what the readings say so far of a heater that is `known`, and the gain they show.
+
+    Parameters
+    ----------
+    rows : collection of Seen
+        Readings around the cut.
+    cut : Cut
+        When the power was cut, and why.
+    known : Gain
+        What the heater did when it was sound.
+    sd_k : float
+        Standard deviation of a reading, in K.
+    sure : float
+        So many standard deviations an answer has to differ from nothing.
+    """
+    found, shown = question.of_known_rows(rows, cut.from_s, cut.at_s, known, sd_k, sure)
+    late = sure < question.SURE
+    if cut.began_s is None or (found is Answer.HEATS and not late):
+        return found, shown
+    odds = evidence.odds(rows, cut.began_s, known, sd_k)
+    found = evidence.weigh(found, odds, crept=cut.crept, late=late)
+    return found, known if odds > evidence.SOUND else shown
