@@ -68,7 +68,7 @@ class Ceiling:
             self.level_c = sum(row.reading_c for row in stood) / len(stood)
 
     def found(self, rows: Iterable[Seen], known: Gain, now: Seen, sd_k: float) -> bool:
-        """Return whether the reading has come back just now as a sound heater brings it back."""
+        """Return whether a sound heater has just brought the reading back."""
         self._lowest_c = min(self._lowest_c, now.reading_c)
         there_c = self.level_c - THERE_SDS * sd_k
         if self.known or not now.reading_c >= there_c:
@@ -82,7 +82,7 @@ class Ceiling:
         return self.known
 
     def holds(self, block: Block) -> bool:
-        """Return whether the plant is there, and its power cannot be expected to show anything."""
+        """Return whether the plant is there, where power shows nothing."""
         self._most = max(self._most, block.power)
         if not self.known:
             return False

@@ -18,7 +18,7 @@ OVER = "the reading fell faster than any heater can make it: the next heat is wh
 
 
 def wild(rows: Collection[Seen], froms_s: tuple[float, ...], known: Gain, loss: float) -> bool:
-    """Return whether the reading fell so since any of `froms_s`, where it loses `loss` in K/s."""
+    """Return whether it fell so since any of `froms_s`; it loses `loss` in K/s."""
     return any(_fell(rows, from_s, loss) > WILD * known.mean for from_s in froms_s)
 
 

@@ -33,7 +33,7 @@ def believed_s(known: Gain | None, lag_s: float) -> tuple[float, float]:
 def answer(
     rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float, sure: float = question.SURE
 ) -> tuple[Answer, Gain]:
-    """Return what the readings say so far of a heater that is `known`, and the gain they show.
+    """Return what the readings say so far, and the gain they show.
 
     Parameters
     ----------
