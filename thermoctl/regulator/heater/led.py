@@ -56,6 +56,11 @@ class LedWatch:
         """What is known of the block, once it is."""
         return self.inner.known
 
+    @property
+    def ceiling_c(self) -> float:
+        """Reading in degC that all the power does not pass; NaN before one was seen."""
+        return self.inner.ceiling_c
+
     def recall(self, known: Gain) -> None:
         """Begin with what an earlier run knew."""
         self.inner.recall(known)
