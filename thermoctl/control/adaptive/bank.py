@@ -29,8 +29,8 @@ from thermoctl.control.adaptive.evidence import (
     Noise,
     Weights,
 )
-from thermoctl.control.adaptive.filters import D, T, X, Z
-from thermoctl.control.adaptive.gains import Gains, reckoned
+from thermoctl.control.adaptive.filters import T, X, Z
+from thermoctl.control.adaptive.gains import Corrected, Gains, reckoned
 from thermoctl.control.adaptive.hypotheses import Hypotheses
 from thermoctl.control.adaptive.path import Path
 from thermoctl.quantities import Array, clamp, is_finite_number
@@ -310,8 +310,7 @@ class Bank:
             filters.grown(block, block[T, X] - before[T, X], self.constants)
         filters.limit_gain(block, self.constants)
         self._limit_loss(block, sample)
-        calm = still and not drifting.disturbed and sample >= drifting.silent_until
-        gains = self._gains(belief, before, block, S) if calm else _older(belief.gains)
+        gains = self._gains(belief, Corrected(before, block, S), drifting, still=still)
         if heard > 0.0:
             weights = weights.after(heard, nis, S)
         elif sample < gate.silent_until and not gate.jumped:
@@ -333,19 +332,15 @@ class Bank:
         return share * noise.colour.news
 
     def _gains(
-        self, belief: BankBelief, before: filters.Block, block: filters.Block, S: Array
+        self, belief: BankBelief, step: Corrected, drifting: Drifting, *, still: bool
     ) -> Gains | None:
-        """Return the gains after a full sample of rest, of which `block` is corrected in place.
-
-        It has missed what P did while it was left alone.
-        """
-        gains = _older(belief.gains)
-        if gains is not None and gains.fresh:
+        """Return the gains after a full `step`; power that moves for a moment leaves them alone."""
+        if belief.sample + 1 < drifting.silent_until:
+            return None
+        gains = None if belief.gains is None else belief.gains.older(kept=False)
+        if not still or drifting.disturbed or (gains is not None and gains.fresh):
             return gains
-        K = filters.gains_at_rest(before, S)
-        if gains is not None and gains.kept and belief.block is not None:
-            K[D] *= filters.caught_up(block, belief.block, gains.kept)
-        return reckoned(gains, K, S, belief.weights.likeliest)
+        return reckoned(gains, step, belief.block, belief.weights.likeliest)
 
     def _drifted(self, belief: BankBelief, still: bool, sds: float) -> Drifting:
         """Return the sums after an innovation of so many standard deviations."""
@@ -390,8 +385,3 @@ class Bank:
         if sample < belief.gate.silent_until:
             return noise._replace(colour=noise.colour._replace(most=most)), belief.weights
         return noise, belief.weights.tempered(most / noise.colour.most)
-
-
-def _older(gains: Gains | None) -> Gains | None:
-    """Return `gains` a full sample later: power that moves for a moment leaves them alone."""
-    return None if gains is None else gains.older(kept=False)

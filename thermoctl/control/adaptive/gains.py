@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from thermoctl.control.adaptive.filters import D
+from thermoctl.control.adaptive import filters
+from thermoctl.control.adaptive.filters import Block, D
 from thermoctl.quantities import Array
 
 GOOD_SAMPLES = 14
@@ -54,10 +55,24 @@ class Gains(NamedTuple):
         return Gains(self.K, self.S, self.age + 1, self.kept + kept, self.settled)
 
 
-def reckoned(before: Gains | None, K: Array, S: Array, likeliest: int) -> Gains:
-    """Return the gains of a sample of rest, after those that were reckoned `before`."""
+class Corrected(NamedTuple):
+    """A full step: the block predicted for a reading, the one corrected by it, and S."""
+
+    predicted: Block
+    block: Block
+    S: Array
+
+
+def reckoned(before: Gains | None, step: Corrected, last: Block | None, likeliest: int) -> Gains:
+    """Return the gains of a `step` of rest, after those that were reckoned `before`.
+
+    Its block is given what P has missed since it was left alone, as in the `last` one; in place.
+    """
+    S, K = step.S, filters.gains_at_rest(step.predicted, step.S)
     if before is None:
         return Gains(K, S)
+    if before.kept and last is not None:
+        K[D] *= filters.caught_up(step.block, last, before.kept)
     now = K.item(D, likeliest) * S.item(likeliest)
     then = before.K.item(D, likeliest) * before.S.item(likeliest)
     return Gains(K, S, 0, 0, abs(now - then) <= SETTLED * abs(now))
