@@ -135,7 +135,7 @@ class Feasibility:
         self._before = Gathered()
         self._lag_s = LAG_GUESS_S
         self._heat = 0.0  # power that has reached the sensor
-        self._asked = 0.0  # of it, what was commanded
+        self._asked = 0.0  # of it, what was commanded; below 0 that of another actuator
         self._reading_c = math.nan
         self._unseen_s = 0.0
         self._slip, self._settling = Slip(), Settling()
@@ -143,6 +143,11 @@ class Feasibility:
         self._failed = False
         self._standings = {UNREACHABLE: Standing(), DRIVEN: Standing()}
         self.known = Feasible()
+
+    @property
+    def heat(self) -> float:
+        """Power that has reached the sensor."""
+        return self._heat
 
     @property
     def belief(self) -> HeatBelief | None:
@@ -302,7 +307,7 @@ class Feasibility:
 
     def _tell(self, belief: HeatBelief, wanted: Wanted, t_s: float) -> None:
         """Raise the alarms, or clear them."""
-        full, none = self._heat >= FULL * wanted.power_max, self._asked <= NONE
+        full, none = self._heat >= FULL * wanted.power_max, abs(self._asked) <= NONE
         missing_sds = _missing_sds(belief, wanted, full)
         driven_sds = self._driven_sds(belief, wanted, none)
         for code, sds, words in (

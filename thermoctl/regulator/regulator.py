@@ -12,7 +12,8 @@ from collections.abc import Mapping
 from thermoctl.errors import Refused
 from thermoctl.ports import Controller, Remembered, Situation
 from thermoctl.quantities import clamp, is_finite_number
-from thermoctl.regulator.feasible import Feasibility, Wanted
+from thermoctl.regulator.feasible import Wanted
+from thermoctl.regulator.feasible_sides import balance_for
 from thermoctl.regulator.guard import Failure, Guard, attempt
 from thermoctl.regulator.heater.sides import Watch, watch_for
 from thermoctl.regulator.judge import Verdict
@@ -84,7 +85,7 @@ class Regulator:
         limits = plan.limits
         self._shadow = Shadow(plan.shadow, limits.power_min, limits.power_max, self._emit)
         self._learning = Learning(plan.identifier, self._supervisor, self._guard)
-        self._feasibility = Feasibility(plan.limits.period_s, self._supervisor.alarms, self._emit)
+        self._feasibility = balance_for(plan.limits, self._supervisor.alarms, self._emit)
         self._load = KnownLoad(self._emit)
         self._pairing = Pairing(
             plan.limits, plan.disagreement_k, self._supervisor.alarms, self._emit

@@ -1,0 +1,76 @@
+"""A set point out of reach, of a tank that is heated and cooled."""
+
+import numpy as np
+import pytest
+
+from thermoctl.app.compose import regulator_for
+from thermoctl.app.settings import load
+from thermoctl.signals import Measurement, State
+
+UNREACHABLE = "setpoint.unreachable"
+BOARDS = {"daq": {"kind": "simulated"}}
+
+
+class Tank:
+    """8 l in a room of 22 degC: a loss of 6 W/K, a heater and a cooler behind lags."""
+
+    def __init__(self, setpoint_c, heater_w=1000.0, cooler_w=60.0, seed=1):
+        loop = {
+            "setpoint_c": setpoint_c,
+            "trip_above_c": 90.0,
+            "trip_below_c": -9.0,
+            "mode": "auto",
+            "controller": {"kind": "adaptive", "action": "heat-cool", "cooling_ratio": 0.1},
+            "actuator": {"board": "daq", "output": "heater"},
+            "cooler": {"board": "daq", "output": "cooler"},
+        }
+        self.regulator = regulator_for(load({"boards": BOARDS, "loops": {"tank": loop}}))
+        self.heater_w, self.cooler_w = heater_w, cooler_w
+        self.water_c = self.shown_c = 22.0
+        self.element = self.power = self.t_s = 0.0
+        self.rng, self.told = np.random.default_rng(seed), {}
+
+    def run(self, seconds):
+        for _ in range(seconds):
+            self.element += (self.power - self.element) / 15.0
+            full_w = self.heater_w if self.element > 0.0 else self.cooler_w
+            flow_w = full_w * self.element - 6.0 * (self.water_c - 22.0)
+            self.water_c += flow_w / 33_500.0
+            self.shown_c += (self.water_c - self.shown_c) / 6.0
+            reading_c = self.shown_c + 0.01 * self.rng.standard_normal()
+            step = self.regulator.step(Measurement(self.t_s, reading_c))
+            self.power, self.t_s = step.command.power, self.t_s + 1.0
+            for alarm in step.alarms:
+                self.told.setdefault(alarm.code, (step.t_s, alarm.text))
+        return step
+
+
+def test_what_the_cooler_cannot_hold_is_told_with_the_lowest_temperature_it_can():
+    tank = Tank(5.0)
+    step = tank.run(5400)
+    told_s, text = tank.told[UNREACHABLE]
+    assert told_s < 4000.0
+    assert text.startswith("expected at least ")
+    assert step.state is State.RUN
+    assert tank.power == -1.0
+    assert set(tank.told) == {UNREACHABLE}  # and nothing else drives what the cooler is cooling
+    lowest_c = 22.0 - 60.0 / 6.0
+    assert abs(step.feasible.highest_c - lowest_c) < 3.0 * step.feasible.highest_sd_k
+    assert step.feasible.holding_power < -1.0
+
+
+@pytest.mark.slow
+def test_what_the_heater_cannot_hold_is_told_as_ever():
+    tank = Tank(80.0, heater_w=200.0)
+    step = tank.run(5400)
+    assert tank.told[UNREACHABLE][1].startswith("expected at most ")
+    assert abs(step.feasible.highest_c - (22.0 + 200.0 / 6.0)) < 3.0 * step.feasible.highest_sd_k
+
+
+@pytest.mark.slow
+def test_what_holds_has_the_sign_of_whoever_gives_it():
+    for setpoint_c, full_w in ((18.0, 60.0), (30.0, 1000.0)):
+        tank = Tank(setpoint_c)
+        holding = 6.0 * (setpoint_c - 22.0) / full_w
+        assert tank.run(5400).feasible.holding_power == pytest.approx(holding, abs=0.05)
+        assert tank.told == {}
