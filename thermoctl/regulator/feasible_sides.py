@@ -1,9 +1,9 @@
 """Two balances of heat where a plant is heated and cooled.
 
-One goes by the heater, one by the cooler.
-Each takes what the other one gives for a load that nobody knows, and so needs no word of how strong
-the two are beside each other. The heater's says what lies too high and the cooler's what lies too
-low; what is told at a moment is of the one that acts.
+One goes by the heater, one by the cooler. Each takes what the other one gives for a load that
+nobody knows, and so needs no word of how strong the two are beside each other. The heater's says
+what lies too high and the cooler's what lies too low; what is told at a moment is of the one that
+acts.
 """
 
 from __future__ import annotations

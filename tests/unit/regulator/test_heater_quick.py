@@ -1,6 +1,7 @@
 """The watch over a heater that warms by kelvins in a second: a block with a bath around it."""
 
 import numpy as np
+import pytest
 
 from thermoctl.regulator.heater.check import HeaterCheck
 from thermoctl.regulator.heater.known import KnownHeater
@@ -8,7 +9,7 @@ from thermoctl.regulator.heater.response import Gain
 from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor
-from thermoctl.signals import State
+from thermoctl.signals import Measurement, State
 
 LIMITS = Limits(200.0, -50.0, -50.0, 200.0)
 LEARNT_S = 1200
@@ -42,3 +43,24 @@ def test_a_heater_of_which_more_was_needed_has_not_become_stronger():
     assert known.gain.mean == 0.004
     known.accept(Gain(0.01, 0.001, 3))
     assert known.gain.mean == 0.01
+
+
+@pytest.mark.parametrize("cools", [1.2, 1.5, 2.0, 3.0])
+def test_what_falls_with_every_heat_and_stops_with_it_is_the_heater_s_doing(cools):
+    told = []
+    supervisor = Supervisor(LIMITS, lambda name, **_: told.append(name))
+    watch = HeaterWatch(HeaterCheck(), 1.0, supervisor, lambda name, **_: told.append(name))
+    rng, lag, water_c, applied = np.random.default_rng(1), [0.0, 0.0], 40.0, 0.0
+    for second in range(6000):
+        turned = second >= 2400  # by now it cools, and more than it has ever heated
+        lag[0] += (applied - lag[0]) / 10.0
+        lag[1] += (lag[0] - lag[1]) / 10.0
+        water_c += (-cools if turned else 1.0) * 0.006 * lag[1] - 0.0015
+        reading_c = water_c + 0.02 * rng.standard_normal()
+        supervisor.judge(Measurement(float(second), reading_c), float(second), 1.0)
+        watch.observe(float(second), 1.0, reading_c, applied)
+        state = supervisor.rule(float(second), 0.0)
+        asked = 1.0 if turned or second % 400 < 100 else 0.0
+        applied = 0.0 if watch.asks or state is not State.RUN else asked
+    assert supervisor.state is State.LATCHED
+    assert "heater.reversed" in told

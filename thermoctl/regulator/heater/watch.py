@@ -229,7 +229,7 @@ class HeaterWatch:
             lags = CREPT_LAGS if doubt.crept else BEFORE_LAGS
             from_s = self._t_s - max(lags * known.lag_s, BEFORE_S)
             since_s = from_s if doubt.since is None else min(doubt.since.t_s, from_s)
-            wild = fall.wild(self._rows, (since_s, from_s), known, doubt.loss(known))
+            wild = not again and fall.wild(self._rows, (since_s, from_s), known, doubt.loss(known))
             lasts = wild and self._t_s - since_s >= max(BEFORE_LAGS * known.lag_s, fall.WILD_S)
             if hot or lasts or doubt.cold(known, sd_k, again=again):
                 began_s = None if hot or wild else since_s
