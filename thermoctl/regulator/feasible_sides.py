@@ -4,14 +4,19 @@ One goes by the heater, one by the cooler. Each takes what the other one gives f
 nobody knows, and so needs no word of how strong the two are beside each other. The heater's says
 what lies too high and the cooler's what lies too low; what is told at a moment is of the one that
 acts.
+
+A heater that holds a temperature makes up for every draught, and a balance that does not count its
+heat takes the plant for one that always comes back there. Against a strong heater a cooler's would
+learn nothing else, so it begins anew after it.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from thermoctl.regulator.alarms import AlarmRegister
-from thermoctl.regulator.feasible import Feasibility, Wanted
+from thermoctl.regulator.feasible import NONE, Feasibility, Wanted
 from thermoctl.regulator.guard import Failure
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Emit
@@ -37,6 +42,7 @@ class FeasibilitySides:
         self, period_s: float, power_min: float, alarms: AlarmRegister, emit: Emit
     ) -> None:
         self._power_min = power_min
+        self._due = (False, False)
         self._heater = Feasibility(period_s, alarms, emit)
         self._cooler = Feasibility(period_s, alarms, emit)
 
@@ -57,14 +63,23 @@ class FeasibilitySides:
         beyond: float = 0.0,
     ) -> bool:
         """Gather a sample for both; return whether it completed a stretch."""
-        self._cooler.observe(interval_s, -applied, reading_c, lag_s, -beyond)
-        return self._heater.observe(interval_s, applied, reading_c, lag_s, beyond)
+        if applied > NONE:
+            self._cooler.forget()
+        self._due = (
+            self._heater.observe(interval_s, applied, reading_c, lag_s, beyond),
+            self._cooler.observe(interval_s, -applied, reading_c, lag_s, -beyond),
+        )
+        return any(self._due)
 
     def reckon(self, wanted: Wanted, t_s: float) -> None:
         """Learn from the stretch that is complete, and say what it means for `wanted`."""
-        self._heater.reckon(wanted, t_s)
-        cold = replace(wanted, power_max=-self._power_min, power_cools=True)
-        self._cooler.reckon(cold, t_s)
+        heater_due, cooler_due = self._due
+        if heater_due:
+            self._heater.reckon(wanted, t_s)
+        if cooler_due:
+            most, none = -self._power_min, math.nan  # what the heater comes to is no bound of this
+            cold = replace(wanted, power_max=most, power_cools=True, ceiling_c=none)
+            self._cooler.reckon(cold, t_s)
 
     def fail(self, failure: Failure) -> None:
         """Forget what could not be reckoned with, and say so once."""

@@ -293,9 +293,8 @@ class Regulator:
         self, interval_s: float, applied: float, temperature_c: float, lag_s: float | None
     ) -> None:
         """Keep the balance of heat."""
-        beyond = self._applied_power() - self._commanded_power()
-        if not math.isfinite(beyond):
-            beyond = 0.0
+        off = self._applied_power() - self._commanded_power()
+        beyond = off if math.isfinite(off) else 0.0
         if self._feasibility.observe(interval_s, applied, temperature_c, lag_s, beyond):
             self._feasibility.reckon(self._wanted(), self._t_s or 0.0)
 

@@ -1,20 +1,25 @@
 """A set point out of reach, of a tank that is heated and cooled."""
 
+import math
+
 import numpy as np
 import pytest
 
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
-from thermoctl.signals import Measurement, State
+from thermoctl.regulator.alarms import AlarmRegister
+from thermoctl.regulator.feasible import Wanted
+from thermoctl.regulator.feasible_sides import FeasibilitySides
+from thermoctl.signals import Measurement, Mode, State
 
 UNREACHABLE = "setpoint.unreachable"
 BOARDS = {"daq": {"kind": "simulated"}}
 
 
 class Tank:
-    """8 l in a room of 22 degC: a loss of 6 W/K, a heater and a cooler behind lags."""
+    """8 l in a room about 22 degC: a loss of 6 W/K, a heater and a cooler behind lags."""
 
-    def __init__(self, setpoint_c, heater_w=1000.0, cooler_w=60.0, seed=1):
+    def __init__(self, setpoint_c, heater_w=1000.0, cooler_w=60.0, seed=1, noise_k=0.01):
         loop = {
             "setpoint_c": setpoint_c,
             "trip_above_c": 90.0,
@@ -25,7 +30,7 @@ class Tank:
             "cooler": {"board": "daq", "output": "cooler"},
         }
         self.regulator = regulator_for(load({"boards": BOARDS, "loops": {"tank": loop}}))
-        self.heater_w, self.cooler_w = heater_w, cooler_w
+        self.heater_w, self.cooler_w, self.noise_k = heater_w, cooler_w, noise_k
         self.water_c = self.shown_c = 22.0
         self.element = self.power = self.t_s = 0.0
         self.rng, self.told = np.random.default_rng(seed), {}
@@ -34,10 +39,11 @@ class Tank:
         for _ in range(seconds):
             self.element += (self.power - self.element) / 15.0
             full_w = self.heater_w if self.element > 0.0 else self.cooler_w
-            flow_w = full_w * self.element - 6.0 * (self.water_c - 22.0)
+            room_c = 22.0 + 0.3 * math.sin(self.t_s / 430.0)
+            flow_w = full_w * self.element - 6.0 * (self.water_c - room_c)
             self.water_c += flow_w / 33_500.0
             self.shown_c += (self.water_c - self.shown_c) / 6.0
-            reading_c = self.shown_c + 0.01 * self.rng.standard_normal()
+            reading_c = self.shown_c + self.noise_k * self.rng.standard_normal()
             step = self.regulator.step(Measurement(self.t_s, reading_c))
             self.power, self.t_s = step.command.power, self.t_s + 1.0
             for alarm in step.alarms:
@@ -65,6 +71,25 @@ def test_what_the_heater_cannot_hold_is_told_as_ever():
     step = tank.run(5400)
     assert tank.told[UNREACHABLE][1].startswith("expected at most ")
     assert abs(step.feasible.highest_c - (22.0 + 200.0 / 6.0)) < 3.0 * step.feasible.highest_sd_k
+
+
+def test_a_cooler_s_balance_begins_anew_after_the_heater_that_makes_up_for_everything():
+    balance = FeasibilitySides(1.0, -1.0, AlarmRegister(), lambda name, **fields: None)
+    wanted = Wanted(15.0, 1.0, Mode.AUTO)
+
+    def run(seconds, applied, rate):
+        for second in range(seconds):
+            if balance.observe(1.0, applied, 22.0 + rate * second, 20.0):
+                balance.reckon(wanted, float(second))
+
+    run(900, -1.0, -0.005)
+    assert balance._cooler.belief.gain_known
+    heater = balance._heater.belief
+    run(1, 0.3, 0.0)
+    assert balance._cooler.belief is None
+    assert balance._heater.belief is heater
+    run(900, -1.0, -0.005)
+    assert balance._cooler.belief.gain_known
 
 
 @pytest.mark.slow
