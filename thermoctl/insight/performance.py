@@ -12,6 +12,7 @@ import numpy as np
 
 from thermoctl.insight.harris import Harris, autocorrelation, harris
 from thermoctl.insight.lagging import DEAD
+from thermoctl.insight.swing import Swing, swing_of
 from thermoctl.insight.values import Limit, Performance
 from thermoctl.insight.wording import plain
 from thermoctl.quantities import Array
@@ -34,8 +35,6 @@ NOISY = 0.5
 """Noise that is a larger share of the variance than this is what limits."""
 CLOSE = 1.25
 """A deviation of so many times the bound is close to it."""
-SWING = 0.5
-"""A loop whose error is so alike after a turn, and so unlike after half of one, swings."""
 
 
 def delay_samples(lag_s: float, period_s: float) -> int:
@@ -59,19 +58,26 @@ class PerformanceWatch:
         self._powers = (power_min + NEAR, power_max - NEAR)
         self._error: deque[float] = deque(maxlen=LONGEST)
         self._reading: deque[float] = deque(maxlen=LONGEST)
-        self._bound: deque[bool] = deque(maxlen=LONGEST)
+        self._given: deque[float] = deque(maxlen=LONGEST)
         self._due_s = -math.inf
         self.now = Performance("collecting: not at rest in mode auto yet")
 
     def forget(self, why: str) -> None:
         """Begin anew, for a reason that the verdict tells."""
-        for each in (self._error, self._reading, self._bound):
+        for each in (self._error, self._reading, self._given):
             each.clear()
         self.now = Performance(why)
         self._due_s = -math.inf
 
     def after(
-        self, t_s: float, reading_c: float, setpoint_c: float, power: float, lag_s: float, sd: float
+        self,
+        t_s: float,
+        reading_c: float,
+        setpoint_c: float,
+        power: float,
+        lag_s: float,
+        sd: float,
+        gain_k_per_s: float = math.nan,
     ) -> Performance:
         """Take a sample at rest; return the judgement, at most a minute old.
 
@@ -87,21 +93,22 @@ class PerformanceWatch:
             Total lag of the plant.
         sd : float
             Standard deviation of a reading, in K.
+        gain_k_per_s : float
+            Heating rate at full power; NaN where nobody knows it.
         """
         self._error.append(reading_c - setpoint_c)
         self._reading.append(reading_c)
-        low, high = self._powers
-        self._bound.append(not low < power < high)
+        self._given.append(power)
         if t_s >= self._due_s:
             self._due_s = t_s + TURN_S
-            self.now = self._judged(lag_s, sd)
+            self.now = self._judged(lag_s, sd, gain_k_per_s)
         return self.now
 
     def _needed(self, lag_s: float) -> int:
         span = max(SHORTEST_S, SHORTEST_LAGS * lag_s) / self._period_s
         return min(LONGEST, max(FEWEST, math.ceil(span)))
 
-    def _judged(self, lag_s: float, noise_sd_k: float) -> Performance:
+    def _judged(self, lag_s: float, noise_sd_k: float, gain_k_per_s: float) -> Performance:
         needed, count = self._needed(lag_s), len(self._error)
         if count < needed:
             share = plain(100.0 * count / needed)
@@ -111,8 +118,10 @@ class PerformanceWatch:
         if found is None:
             return Performance("the readings do not move: nothing to judge")
         step_k = smallest_step(np.array(self._reading))
-        limited = float(np.mean(self._bound)) > AT_BOUND
-        limit, why = reason(error, found, self._period_s, lag_s, noise_sd_k, step_k, limited)
+        given, (low, high) = np.array(self._given), self._powers
+        limited = float(np.mean((given <= low) | (given >= high))) > AT_BOUND
+        swing = swing_of(error, given, self._period_s, lag_s, gain_k_per_s)
+        limit, why = reason(error, found, swing, self._period_s, lag_s, noise_sd_k, step_k, limited)
         return Performance(
             why,
             limit,
@@ -133,6 +142,7 @@ def smallest_step(reading: Array) -> float:
 def reason(
     error: Array,
     found: Harris,
+    swing: Swing | None,
     period_s: float,
     lag_s: float,
     noise_sd_k: float,
@@ -147,6 +157,8 @@ def reason(
         Control errors in K.
     found : Harris
         Their index.
+    swing : Swing or None
+        Their cycle, if there is one.
     period_s, lag_s : float
         Time between two samples, total lag of the plant.
     noise_sd_k, step_k : float
@@ -155,13 +167,16 @@ def reason(
         Whether the power was at a bound for more than `AT_BOUND` of the time.
     """
     deviation_k, ratio = found.deviation_k, f"{plain(found.ratio, 2)} times the bound"
+    if found.ratio < CLOSE:
+        swing = None
+    if swing is not None and swing.elsewhere:
+        return Limit.ELSEWHERE, f"{ratio}: {swing.words}"
     if limited:
         return Limit.POWER, f"{ratio}: the power is at its limit, no law could give more"
     if deviation_k < STEPS * step_k:
         return Limit.STEP, f"{ratio}: the sensor's step of {plain(1e3 * step_k)} mK limits you"
-    turn = cycle_s(error, period_s, lag_s)
-    if turn is not None and found.ratio > CLOSE:
-        return Limit.CYCLE, f"{ratio}: a cycle of {plain(turn)} s, the loop swings"
+    if swing is not None:
+        return Limit.CYCLE, f"{ratio}: {swing.words}, the loop swings"
     if noise_sd_k**2 > NOISY * deviation_k**2:
         return Limit.NOISE, f"{ratio}: noise of {plain(1e3 * noise_sd_k)} mK a reading limits you"
     if found.ratio < CLOSE:
@@ -172,31 +187,6 @@ def reason(
             f"{ratio}: disturbances stay for long, the law could be brisker (less calmness)",
         )
     return Limit.LAG, f"{ratio}: the lag limits you; calmness trades travel for deviation"
-
-
-def cycle_s(error: Array, period_s: float, lag_s: float) -> float | None:
-    """Return the period of a cycle in s, None where the loop does not swing.
-
-    The autocorrelation of a cycle is as negative after half a turn as it is positive after a whole
-    one; that of a filtered noise has died down by then.
-    """
-    reach = min(len(error) // 4, math.ceil(20.0 * lag_s / period_s))
-    e = error - error.mean()
-    if reach < 4 or not float(e @ e) > 0.0:
-        return None
-    r = autocorrelation(e, reach)
-    below = np.flatnonzero(r < 0.0)
-    if not len(below):
-        return None
-    trough = int(below[0])
-    back = np.flatnonzero(r[trough:] > 0.0)
-    if not len(back):
-        return None
-    half = trough + int(np.argmin(r[trough : trough + int(back[0])]))
-    peak = trough + int(back[0]) + int(np.argmax(r[trough + int(back[0]) :]))
-    if r[half] < -SWING and r[peak] > SWING:
-        return peak * period_s
-    return None
 
 
 def sluggish(error: Array, period_s: float, lag_s: float) -> bool:

@@ -121,6 +121,7 @@ class Limit(StrEnum):
     LAG = "the lag"
     POWER = "the power"
     CYCLE = "a cycle"
+    ELSEWHERE = "something else"
     UNTOLD = "untold"
 
 

@@ -16,6 +16,7 @@ from thermoctl.insight.gate import GateWatch
 from thermoctl.insight.performance import PerformanceWatch
 from thermoctl.insight.reckoning import Reckoning
 from thermoctl.insight.rest import Rest
+from thermoctl.insight.restless import Restless
 from thermoctl.insight.rows import Known, rows
 from thermoctl.insight.samples import Samples
 from thermoctl.insight.told import change_of, change_of_gain, dilution, jump_at
@@ -71,6 +72,7 @@ class Insights:
         self._period_s, self._heater_w = period_s, heater_w
         self._witness, self._gate, self._rest = Witness(period_s), GateWatch(), Rest()
         self._performance = PerformanceWatch(period_s, power_min, power_max)
+        self._restless = Restless()
         self._faults = Faults()
         self._samples = Samples(period_s)
         self._known: _Known | None = None
@@ -118,6 +120,7 @@ class Insights:
         auto = step.mode is Mode.AUTO and step.state is State.RUN
         why = "collecting: moved a moment ago" if auto else "not in mode auto"
         self._performance.forget(why)
+        self._restless.begin()
 
     def _watch(self, step: Step, plant: PlantBelief, applied: float) -> None:
         """Show the step to everyone who watches."""
@@ -125,6 +128,9 @@ class Insights:
         reading_c = step.measurement.temperature_c if good else math.nan
         self._samples.take(step.t_s, reading_c, applied, plant.lag_s)
         known = self._known_after(step, plant)
+        gain_k_per_s = plant.gain_k_per_s if known is None else known.gain.value
+        if self._performance.now.index is None and self._rest.lasts_s(step.t_s) < CALM_S:
+            self._judge_unrest(step, plant.lag_s, gain_k_per_s)
         if known is None:
             return
         if self._moving and self._rest.lasts_s(step.t_s) >= max(CALM_S, CALM_LAGS * known.lag_s):
@@ -140,7 +146,7 @@ class Insights:
         if assay is not None:
             self._assayed(known, step.t_s, assay)
         if good and self._rest.lasts_s(step.t_s) > 0.0 and not known.changes.busy:
-            self._at_rest(step, plant, reading_c)
+            self._at_rest(step, plant, reading_c, gain_k_per_s)
 
     def _known_after(self, step: Step, plant: PlantBelief) -> _Known | None:
         """Return what is known of the plant, which begins when the loop is first at rest."""
@@ -154,10 +160,29 @@ class Insights:
         )
         return self._known
 
-    def _at_rest(self, step: Step, plant: PlantBelief, reading_c: float) -> None:
+    def _judge_unrest(self, step: Step, lag_s: float, gain_k_per_s: float) -> None:
+        """Judge what is held, and never at rest for long."""
+        if step.mode is not Mode.AUTO or step.state is not State.RUN:
+            return
+        near = self._rest.lasts_s(step.t_s) > 0.0
+        told = self._restless.after(
+            step.t_s, self._samples, step.setpoint_c, lag_s, gain_k_per_s, near=near
+        )
+        if told is not None:
+            self._performance.now = told
+
+    def _at_rest(
+        self, step: Step, plant: PlantBelief, reading_c: float, gain_k_per_s: float
+    ) -> None:
         """Judge what can only be judged at rest."""
         self._performance.after(
-            step.t_s, reading_c, step.setpoint_c, self._applied, plant.lag_s, plant.noise_sd_k
+            step.t_s,
+            reading_c,
+            step.setpoint_c,
+            self._applied,
+            plant.lag_s,
+            plant.noise_sd_k,
+            gain_k_per_s,
         )
         turn_s = max(TURN_S, TURN_LAGS * plant.lag_s)
         mean = self._power.after(step.t_s, self._applied, turn_s)

@@ -8,12 +8,12 @@ import pytest
 from thermoctl.insight.harris import harris
 from thermoctl.insight.performance import (
     PerformanceWatch,
-    cycle_s,
     delay_samples,
     reason,
     sluggish,
     smallest_step,
 )
+from thermoctl.insight.swing import cycle_s, swing_of
 from thermoctl.insight.values import Limit
 
 LAG_S, DELAY = 18.0, 4
@@ -31,7 +31,8 @@ def leaning(decay, samples=3600, seed=1):
 
 
 def judged(error, noise_sd_k=0.0, step_k=0.0, limited=False):
-    return reason(error, harris(error, DELAY), 1.0, LAG_S, noise_sd_k, step_k, limited)
+    swing = swing_of(error, np.zeros(len(error)), 1.0, LAG_S, np.nan)
+    return reason(error, harris(error, DELAY), swing, 1.0, LAG_S, noise_sd_k, step_k, limited)
 
 
 def test_white_errors_are_as_steady_as_can_be():
