@@ -83,7 +83,7 @@ class Filter:
             self.S = self.P[1, 1] + R
             self.K = self.P[:, 1] / self.S
             self.K[3] *= e if self.P[3, 3] <= (0.1 * self.x[3]) ** 2 else 1.0
-        S, K = self.S, self.K * [1, 1, 1, not steady]
+        S, K = self.S, self.K
         self.x = self.x + K * nu
         if settling:
             self.grow(K[0] * nu)

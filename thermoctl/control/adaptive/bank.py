@@ -300,7 +300,7 @@ class Bank:
             block, drifting, gains = self._disturbed(belief, block, gate, nu, noise.believed)
         if gains is not None:
             block = filters.followed(block, y_c, gains.K)
-            self._limit_loss(block, sample)
+            self._limit(block, sample)
             return Met(
                 noise, gate, weights, drifting, 0.0, surprise_k, block, gains.older(kept=True)
             )
@@ -308,8 +308,7 @@ class Bank:
         block, nis, S = filters.corrected(block, y_c, noise.believed, self.constants, share)
         if sample < gate.silent_until:  # what was poured in is colder, and loses less
             filters.grown(block, block[T, X] - before[T, X], self.constants)
-        filters.limit_gain(block, self.constants)
-        self._limit_loss(block, sample)
+        self._limit(block, sample)
         gains = self._gains(belief, Corrected(before, block, S), drifting, still=still)
         if heard > 0.0:
             weights = weights.after(heard, nis, S)
@@ -317,8 +316,9 @@ class Bank:
             weights = weights.among_shapes(nis, S)
         return Met(noise, gate, weights, drifting, heard, surprise_k, block, gains)
 
-    def _limit_loss(self, block: filters.Block, sample: int) -> None:
-        """Limit the loss as soon as the gain is known, in place."""
+    def _limit(self, block: filters.Block, sample: int) -> None:
+        """Limit the gain and, as soon as that is known, the loss; in place."""
+        filters.limit_gain(block, self.constants)
         if sample * self.period_s > LOSS_FROM_S:
             filters.limit_loss(block, self.constants)
 
@@ -340,7 +340,8 @@ class Bank:
         gains = None if belief.gains is None else belief.gains.older(kept=False)
         if not still or drifting.disturbed or (gains is not None and gains.fresh):
             return gains
-        return reckoned(gains, step, belief.block, belief.weights.likeliest)
+        m = belief.weights.likeliest
+        return reckoned(gains, step, belief.block, m, self.constants)
 
     def _drifted(self, belief: BankBelief, still: bool, sds: float) -> Drifting:
         """Return the sums after an innovation of so many standard deviations."""

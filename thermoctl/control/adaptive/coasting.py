@@ -90,7 +90,7 @@ def outlook(
 ) -> Outlook:
     """Return the means over the hypotheses, weighted by `share`.
 
-    From one `before`, of the same weights, gains and P, is taken what depends on nothing else.
+    From one `before`, of the same weights and P, is taken what depends on nothing else.
     """
     h, mean = hypotheses.period_s, share.dot
     d, beta = block[D, X], block[BETA, X]
@@ -102,19 +102,18 @@ def outlook(
     coasting *= coasting
     variance = float(mean(coasting)) - coasting_c * coasting_c
     if before is None:
-        gain, heater_k = float(mean(beta)) / h, float(mean(hypotheses.element * beta))
         lag_s = float(mean(hypotheses.lag_s))
         gain_sd = math.sqrt(float(mean(block[BETA, BETA]))) / h
         lag_sd_s = math.sqrt(max(float(mean(hypotheses.lag_squared)) - lag_s * lag_s, 0.0))
         lag_harmonic_s = 1.0 / float(mean(hypotheses.lag_inverse))
     else:
-        _, _, lag_s, gain, heater_k, _, _, gain_sd, lag_sd_s, lag_harmonic_s = before
+        _, _, lag_s, _, _, _, _, gain_sd, lag_sd_s, lag_harmonic_s = before
     return Outlook(  # in the order of its fields: by their names it would take twice as long
         coasting_c,
         holding_power,
         lag_s,
-        gain,
-        heater_k,
+        float(mean(beta)) / h,
+        float(mean(hypotheses.element * beta)),
         float(mean(path.heat)) - holding_power,
         math.sqrt(max(variance, 0.0)),
         gain_sd,

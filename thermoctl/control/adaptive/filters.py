@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from thermoctl.control.adaptive.constants import Plants
 from thermoctl.control.adaptive.hypotheses import Hypotheses
@@ -301,9 +302,7 @@ def corrected(
     g /= np.sqrt(S)  # P H' / sqrt S, and beside it -nu / sqrt S
     after = g[:X, None] * g
     if proof < 1.0:  # of beta K = p g / sqrt S: Joseph's form differs from P - g g' here alone
-        most = constants.known_share * block[BETA, X]
-        most *= most
-        known, P, x = block[BETA, BETA] <= most, after[BETA, BETA], after[BETA, X]
+        known, P, x = _known(block, constants), after[BETA, BETA], after[BETA, X]
         np.multiply(P, proof * (2.0 - proof), out=P, where=known)
         np.multiply(x, proof, out=x, where=known)
     np.subtract(block, after, out=after)  # P - g g', x + g nu / sqrt S
@@ -311,17 +310,26 @@ def corrected(
 
 
 def followed(block: Block, y_c: float, K: Array) -> Block:
-    """Return the block after reading `y_c`, the states but for beta corrected by `K`."""
+    """Return the block after reading `y_c`, the states corrected by the gains `K`."""
     after = block.copy()
-    x = after[:BETA, X]
+    x = after[:, X]
     x += K * (y_c - x[Z])
     return after
 
 
-def gains_at_rest(block: Block, S: Array) -> Array:
-    """Return the gains K of water, sensor and loss, shape (3, n)."""
-    K: Array = block[Z, :BETA] / S
+def gains_at_rest(block: Block, S: Array, constants: PerPeriod) -> Array:
+    """Return the gains K of the states, shape (4, n), those of `corrected` at rest."""
+    K: Array = block[Z, :X] / S
+    K[BETA, _known(block, constants)] = 0.0
     return K
+
+
+def _known(block: Block, constants: PerPeriod) -> npt.NDArray[np.bool_]:
+    """Return of which hypotheses the gain beta is known, shape (n,)."""
+    most = constants.known_share * block[BETA, X]
+    most *= most
+    known: npt.NDArray[np.bool_] = block[BETA, BETA] <= most
+    return known
 
 
 def caught_up(block: Block, before: Block, samples: int) -> Array:

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from thermoctl.control.adaptive import filters
-from thermoctl.control.adaptive.filters import Block, D
+from thermoctl.control.adaptive.filters import Block, D, PerPeriod
 from thermoctl.quantities import Array
 
 GOOD_SAMPLES = 14
@@ -28,9 +28,8 @@ class Gains(NamedTuple):
 
     Parameters
     ----------
-    K : ndarray, shape (3, n)
-        By how much water, sensor and loss of each go with its innovation. What a gain is, rest does
-        not show.
+    K : ndarray, shape (4, n)
+        By how much the states of each go with its innovation.
     S : ndarray, shape (n,)
         Variances of the innovations.
     age, kept : int
@@ -63,12 +62,18 @@ class Corrected(NamedTuple):
     S: Array
 
 
-def reckoned(before: Gains | None, step: Corrected, last: Block | None, likeliest: int) -> Gains:
+def reckoned(
+    before: Gains | None,
+    step: Corrected,
+    last: Block | None,
+    likeliest: int,
+    constants: PerPeriod,
+) -> Gains:
     """Return the gains of a `step` of rest, after those that were reckoned `before`.
 
     Its block is given what P has missed since it was left alone, as in the `last` one; in place.
     """
-    S, K = step.S, filters.gains_at_rest(step.predicted, step.S)
+    S, K = step.S, filters.gains_at_rest(step.predicted, step.S, constants)
     if before is None:
         return Gains(K, S)
     if before.kept and last is not None:
