@@ -25,7 +25,7 @@ import numpy as np
 from thermoctl.quantities import Array
 from thermoctl.regulator.heater.doubt import Seen
 from thermoctl.regulator.heater.known import CHANGED
-from thermoctl.regulator.heater.question import Answer, near
+from thermoctl.regulator.heater.question import Answer, near, or_longer
 from thermoctl.regulator.heater.response import Gain
 
 SOUND, SURE = 5.0, 3.0
@@ -46,7 +46,9 @@ JUMP_SDS = 5.0
 another vessel, no load; what was before says nothing of it."""
 
 
-def odds(rows: Iterable[Seen], from_s: float, known: Gain, sd_k: float) -> float:
+def odds(
+    rows: Iterable[Seen], from_s: float, known: Gain, sd_k: float, *, late: bool = False
+) -> float:
     """Return the log of the odds of a sound heater to one that does nothing.
 
     Parameters
@@ -59,6 +61,8 @@ def odds(rows: Iterable[Seen], from_s: float, known: Gain, sd_k: float) -> float
         What the heater did when it was sound; most of that is sound still.
     sd_k : float
         Standard deviation of a reading, in K, above 0.
+    late : bool
+        Whether its lag may have become any longer one.
 
     Returns
     -------
@@ -68,7 +72,8 @@ def odds(rows: Iterable[Seen], from_s: float, known: Gain, sd_k: float) -> float
     meant = _since_jump([row for row in rows if row.t_s >= from_s], known, sd_k)
     if len(meant) < ROWS_LEAST:
         return 0.0
-    n, sizes, squares, products, heats = _innovations(meant, near(known), sd_k)
+    places = or_longer(known) if late else near(known)
+    n, sizes, squares, products, heats = _innovations(meant, places, sd_k)
     best = products / heats
 
     def likelihood(gain: Array) -> float:
@@ -83,13 +88,16 @@ def odds(rows: Iterable[Seen], from_s: float, known: Gain, sd_k: float) -> float
 def weigh(answer: Answer, log_odds: float, *, crept: bool, late: bool) -> Answer:
     """Return `answer`, or what is made of it where a load may have given it.
 
-    A reading that does not answer, while all that came before says it did, is bent by a load. Where
+    An answer that is late is one, unless what came before denies it. A reading that does not
+    answer, while all that came before says it did, is bent by a load. Where
     nothing but the power that holds a reading has grown, it `crept`, any load that ends at the
     right moment gives a bad answer, and it has to be better than that. Longer waiting does not make
     it so; what is likelier by then, `late`, is taken.
     """
-    if log_odds > SOUND:
+    if log_odds > (0.0 if answer is Answer.LATE else SOUND):
         return Answer.HEATS
+    if answer is Answer.LATE:
+        return Answer.OPEN
     if not crept:
         return answer
     if log_odds < -SURE:

@@ -50,8 +50,10 @@ def answer(
     """
     found, shown = question.of_known_rows(rows, cut.from_s, cut.at_s, known, sd_k, sure)
     late = sure < question.SURE
-    if cut.began_s is None or (found is Answer.HEATS and not late):
+    if cut.began_s is None:
+        return (Answer.OPEN if found is Answer.LATE else found), shown
+    if found is Answer.HEATS and not late:
         return found, shown
-    odds = evidence.odds(rows, cut.began_s, known, sd_k)
-    found = evidence.weigh(found, odds, crept=cut.crept, late=late)
-    return found, known if odds > evidence.SOUND else shown
+    odds = evidence.odds(rows, cut.began_s, known, sd_k, late=found is Answer.LATE)
+    weighed = evidence.weigh(found, odds, crept=cut.crept, late=late)
+    return weighed, known if odds > evidence.SOUND or found is Answer.LATE else shown

@@ -39,6 +39,10 @@ USELESS = 0.1
 """A heater that does not make up for this share of the loss has no use that anybody could see."""
 WORTH_MOST = 0.95
 CAUTION = 1.5
+LATE = 0.5
+"""A longer lag has to leave less than this share over, of the squares, before it is one. A lag may
+grow while nobody looks, at rest, and heat that arrives after the cut is that of a heater which
+cools, under the lag that was learnt."""
 BEFORE_LAGS, BEFORE_S = 1.5, 16.0
 """What was before the cut is looked at for so long."""
 CREPT_LAGS = 4.5
@@ -60,6 +64,7 @@ class Answer(Enum):
     NOTHING = "nothing"
     COOLS = "cools"
     HIDDEN = "hidden"
+    LATE = "late"
 
 
 class Contrast(NamedTuple):
@@ -102,6 +107,11 @@ def near(known: Gain) -> range:
     return range(max(known.place - 1, 0), min(known.place + 2, len(LAGS_S)))
 
 
+def or_longer(known: Gain) -> range:
+    """Return the places of the lags that it may have if answers have become late."""
+    return range(near(known).start, len(LAGS_S))
+
+
 def of_known(found: Contrast, known: Gain, sure: float = SURE) -> tuple[Answer, Gain]:
     """Return what `found` says of a known heater, and the gain it shows.
 
@@ -110,10 +120,26 @@ def of_known(found: Contrast, known: Gain, sure: float = SURE) -> tuple[Answer, 
     places = near(known)
     shown = found.best(places)
     if abs(shown.mean) > max(ANSWERS * known.mean, sure * shown.sd):
-        return (Answer.HEATS if shown.mean > 0.0 else Answer.COOLS), shown
+        if shown.mean > 0.0:
+            return Answer.HEATS, shown
+        answer = Answer.COOLS
+    else:
+        answer = Answer.NOTHING if _is_nothing(found, known, places) else Answer.OPEN
+    return (Answer.LATE if _is_late(found, known, shown) else answer), shown
+
+
+def _is_late(found: Contrast, known: Gain, shown: Gain) -> bool:
+    """Return whether a longer lag explains far better what is no answer under those `near`."""
+    later = found.best(or_longer(known))
+    explains = found.left[later.place] < LATE * found.left[shown.place]
+    return explains and later.mean > max(ANSWERS * known.mean, SURE * later.sd)
+
+
+def _is_nothing(found: Contrast, known: Gain, places: Iterable[int]) -> bool:
+    """Return whether all that `found` shows under the lags of `places` is surely little."""
     small = [abs(found.mean[place]) < NOTHING * known.mean for place in places]
     seen = [SURE * found.sd[place] < known.mean for place in places]
-    return (Answer.NOTHING if all(small) and all(seen) else Answer.OPEN), shown
+    return all(small) and all(seen)
 
 
 def of_unknown(found: Contrast, weakest: float, slope: float) -> tuple[Answer, Gain]:
