@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 from thermoctl.control.autotune import AutoTune, Experiment, Found, GivenUp, Tuning
+from thermoctl.control.inexact import ahead, given
 from thermoctl.control.mirror import mirrored
 from thermoctl.control.pid_remembered import as_remembered, found_before
 from thermoctl.control.pid_terms import PidTerms, Terms
@@ -18,14 +19,9 @@ from thermoctl.control.relay import RelayTest
 from thermoctl.control.simc import Gains
 from thermoctl.control.step_test import StepTest
 from thermoctl.ports import Situation
-from thermoctl.quantities import clamp, is_finite_number
+from thermoctl.quantities import is_finite_number
 from thermoctl.ranges import require
 from thermoctl.signals import Beliefs
-
-INEXACT = 0.1
-"""An output that gives less than its command by more than this is limited, and not inexact."""
-AHEAD_S = 60.0
-"""No output is ahead of its commands by more than this, in seconds of full power."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,14 +181,14 @@ class Pid:
         if self.autotune is not None:
             tuning = self.autotune.observe(tuning, situation)
         before, interval_s = belief.terms, situation.interval_s
-        ahead_s = _ahead(belief.ahead_s, situation)
-        setpoint_c, given = situation.setpoint_c, _given(situation, pulses=ahead_s > 0.0)
+        ahead_s = ahead(belief.ahead_s, situation)
+        setpoint_c, left = situation.setpoint_c, given(situation, pulses=ahead_s > 0.0)
         terms = law.see(before, situation.temperature_c, interval_s)
         known = math.isfinite(before.seen_c) and math.isfinite(setpoint_c)
         if known and math.isfinite(before.asked) and interval_s < law.gains.integral_s:
-            terms = law.integrate(terms, setpoint_c, given, interval_s)
+            terms = law.integrate(terms, setpoint_c, left, interval_s)
         elif known:
-            terms = law.track(terms, setpoint_c, given)
+            terms = law.track(terms, setpoint_c, left)
         return PidBelief(replace(terms, asked=math.nan), tuning, belief.kept, ahead_s)
 
     def decide(self, belief: PidBelief, situation: Situation) -> tuple[PidBelief, float]:
@@ -252,29 +248,6 @@ class Pid:
         if tuning.run is not None:
             return {"controller.tuning": f"{self.tuning}, at most {self.tuning_limit_s:g} s"}
         return {}
-
-
-def _given(situation: Situation, *, pulses: bool) -> float:
-    """Return the power that limits and others have left of what was asked for.
-
-    An output that gives more than the command, or a little less, is not exact, and its error is for
-    the integral to find: a law that follows it adds it to its own power at every sample. Nor is one
-    limited that leaves out what it gave too much before: it `pulses`.
-    """
-    applied, commanded = situation.applied, situation.commanded
-    limited = abs(applied) < abs(commanded) - INEXACT and not pulses
-    return applied if limited or math.isnan(commanded) else commanded
-
-
-def _ahead(before_s: float, situation: Situation) -> float:
-    """Return by how much an output is ahead of its commands after this sample.
-
-    Limits never give more than was asked for, relays do, and then less: those are on or off.
-    """
-    beyond = abs(situation.applied) - abs(situation.commanded)
-    if beyond > INEXACT or (beyond < 0.0 and before_s > 0.0):
-        return clamp(before_s + beyond * situation.interval_s, 0.0, AHEAD_S)
-    return before_s
 
 
 def _in_words(gains: Gains) -> str:

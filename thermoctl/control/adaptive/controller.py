@@ -22,6 +22,7 @@ from thermoctl.control.adaptive.plant_belief import (
 )
 from thermoctl.control.adaptive.remembered import recalled, remember
 from thermoctl.control.adaptive.trial import Memory
+from thermoctl.control.inexact import EXACT, Inexact
 from thermoctl.control.lasting import Lasting
 from thermoctl.control.minimum_variance import HOLDING_SD_MAX, RIDE_MAX_S
 from thermoctl.ports import Situation
@@ -36,10 +37,6 @@ DOUBTFUL_LEAST, DOUBTFUL_MOST = 2.0, 0.9
 """With less than so many times the least gain it rests on its bound: 200 l at 33 W, or no heater.
 With more than this share of the most under way it rests on the other one, and power is too strong
 an answer to any error."""
-
-INEXACT_S, INEXACT = 30.0, 0.1
-"""How far outputs are off their commands is averaged over such a time; by more than that share they
-are limited, and not inexact."""
 
 SDS_EVERY = 5
 """Standard deviations change slowly: they are reckoned anew after so many samples."""
@@ -71,8 +68,8 @@ class AdaptiveBelief(NamedTuple):
         How well gain and holding power were known, at most `SDS_EVERY` samples ago.
     surprise_k : float
         This reading less what was expected of it; NaN: not known, or not of one period.
-    inexact : float
-        How much more power than the command the output gives, in the mean of some time.
+    inexact : Inexact
+        By how much the output is off its commands.
     """
 
     bank: BankBelief
@@ -83,7 +80,7 @@ class AdaptiveBelief(NamedTuple):
     memory: Memory = Memory()
     sds: Sds = Sds()
     surprise_k: float = math.nan
-    inexact: float = 0.0
+    inexact: Inexact = EXACT
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +180,7 @@ class Adaptive:
         h, interval_s = self.period_s, situation.interval_s
         behind_s, since_s = belief.behind_s + interval_s, belief.since_s + interval_s
         applied = self._heat(situation.applied)
-        inexact = _inexact(belief.inexact, situation)
+        inexact = belief.inexact.after(situation)
         given_s = belief.given_s + applied * interval_s
         bank, memory, gathered = belief.bank, belief.memory, belief.since_s > 0.0
         power = given_s / since_s if gathered else applied
@@ -227,7 +224,7 @@ class Adaptive:
         heat = power_for(
             outlook, r_c, self.calmness, self.period_s, bounds, before, ramp_heat, self.pace
         )
-        return belief, _made_up_for(self._power(heat), belief.inexact)
+        return belief, belief.inexact.made_up_for(self._power(heat))
 
     def surprise_k(self, belief: AdaptiveBelief, situation: Situation) -> float:
         """Return reading minus what the hypotheses expected; NaN beyond one period."""
@@ -275,25 +272,6 @@ def _due(bank: BankBelief) -> bool:
     if gains is not None and gains.settled:
         return gains.age == 0
     return bank.block is not None and bank.sample % SDS_EVERY == 0
-
-
-def _inexact(before: float, situation: Situation) -> float:
-    """Return how much more than commanded the output gives, in the mean of half a minute."""
-    off = situation.applied - situation.commanded
-    if not abs(off) <= INEXACT:
-        return before
-    return before + (off - before) * min(situation.interval_s / INEXACT_S, 1.0)
-
-
-def _made_up_for(power: float, inexact: float) -> float:
-    """Return what to command so that the output gives `power`; none stays none.
-
-    The law knows what was given, and so what the plant will do. It would never learn that it is not
-    given what it asks for.
-    """
-    if power > 0.0:
-        return max(power - inexact, 0.0)
-    return min(power - inexact, 0.0) if power < 0.0 else power
 
 
 def _doubt(outlook: Outlook | None, plants: Plants) -> str:
