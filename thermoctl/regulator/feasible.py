@@ -286,7 +286,8 @@ class Feasibility:
         It leaves the set point behind, or does not come back to it: something else heats what
         should be heated, the air or an output that is stuck at too little for `heater.stuck_on`.
         The first needs no gain: what has been stuck on since before a start is all that this run
-        has seen of its heater. Nor does it need one that a plant stands still where it is.
+        has seen of its heater. Nor does it need one that a plant stands still where it is, or goes
+        on: a controller that takes its power back in vain teaches that power does the opposite.
         """
         sign = -1.0 if wanted.power_cools else 1.0
         here_c, gain = sign * belief.x[heat_loss.T], sign * belief.gain
@@ -294,13 +295,15 @@ class Feasibility:
         way_k = here_c - sign * wanted.setpoint_c
         known = belief.gain_known
         reversed_ = known and gain < 0.0 and not self._alone.knows
-        if not (none and way_k >= BEYOND_K) or reversed_:
+        if not (none and way_k >= BEYOND_K):
             self._alone.clear()
             return 0.0
         away = heat_loss.spare(belief, sign * here_c, 0.0, belief.ahead_k)
         plant = Beyond(here_c, gain, -sign * away.mean) if known else Beyond(here_c, 0.0, 0.0)
         missing = self._alone.missing(plant, self._before.span_s, math.sqrt(belief.R))
         stays = self._alone.stays(here_c, way_k, self._before.span_s)
+        if reversed_:
+            return SURE_SDS * stays
         leaves = known or self._alone.waited
         leaves_sds = sign * away.mean / away.sd if leaves else 0.0
         return max(leaves_sds, SURE_SDS * missing, SURE_SDS * stays)

@@ -8,7 +8,7 @@ import pytest
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
 from thermoctl.regulator.alarms import AlarmRegister
-from thermoctl.regulator.feasible import Wanted
+from thermoctl.regulator.feasible import DRIVEN, Feasibility, Wanted
 from thermoctl.regulator.feasible_sides import FeasibilitySides
 from thermoctl.signals import Measurement, Mode, State
 
@@ -99,3 +99,19 @@ def test_what_holds_has_the_sign_of_whoever_gives_it():
         holding = 6.0 * (setpoint_c - 22.0) / full_w
         assert tank.run(5400).feasible.holding_power == pytest.approx(holding, abs=0.05)
         assert tank.told == {}
+
+
+def test_a_cooler_stuck_on_drives_though_it_taught_that_less_power_cools():
+    told = set()
+    alarms = AlarmRegister()
+    balance = Feasibility(1.0, alarms, lambda name, **fields: told.add(name))
+    rng, shown_c = np.random.default_rng(1), 5.0
+    for second in range(10_000):
+        since_s = second - 2000.0
+        applied = 0.46 if since_s < 0.0 else max(0.46 - since_s / 400.0, 0.0)
+        if since_s > 0.0:  # goods behind the air: it falls the slower the longer it has
+            shown_c -= 0.006 * math.exp(-since_s / 600.0) + 0.0005
+        if balance.observe(1.0, applied, shown_c + 0.03 * rng.standard_normal(), 150.0):
+            balance.reckon(Wanted(5.0, 1.0, Mode.AUTO, power_cools=True), float(second))
+    assert balance.belief.gain > 0.0
+    assert {row.code for row in alarms.rows()} == {DRIVEN}
