@@ -95,6 +95,12 @@ def test_water_that_jumps_has_all_gains_reckoned(rested):
         belief = after
 
 
+def test_gains_that_are_kept_cannot_be_written_to(rested):
+    for array in rested[-1].gains[:2]:
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+
+
 def test_a_missing_reading_has_them_reckoned_and_grows_the_covariance(rested):
     belief = rested[-1]
     blind = BANK.observe(belief, math.nan, HELD)

@@ -74,10 +74,12 @@ def reckoned(
     Its block is given what P has missed since it was left alone, as in the `last` one; in place.
     """
     S, K = step.S, filters.gains_at_rest(step.predicted, step.S, constants)
+    if before is not None and before.kept and last is not None:
+        K[D] *= filters.caught_up(step.block, last, before.kept)
+    for array in (K, S):
+        array.setflags(write=False)
     if before is None:
         return Gains(K, S)
-    if before.kept and last is not None:
-        K[D] *= filters.caught_up(step.block, last, before.kept)
     now = K.item(D, likeliest) * S.item(likeliest)
     then = before.K.item(D, likeliest) * before.S.item(likeliest)
     return Gains(K, S, 0, 0, abs(now - then) <= SETTLED * abs(now))
