@@ -11,6 +11,9 @@ more water; one that rises so without power would be of a heater stuck on. Such 
 a gain of the loss, and expect at rest what comes of nothing: it is forgotten, and the heater is one
 that nobody knows.
 
+Nor is anything taken for known while it is open what was before the start: heat of before that
+still arrives makes a gain of twice the true one, behind no lag at all.
+
 A first warm-up at full power shows a gain, but hardly how long heat is on its way: as long as the
 power stays, a plant whose stirrer has stopped goes on as before, only later. It shows once there is
 less power and the reading obeys. Until then heat may be under way for as long as in any plant.

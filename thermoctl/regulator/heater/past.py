@@ -55,6 +55,11 @@ class FirstReadings:
         self._power = self.power = math.nan
 
     @property
+    def told(self) -> bool:
+        """Whether what was before has been told."""
+        return self._past is not Past.OPEN
+
+    @property
     def rate(self) -> float:
         """How far the reading has risen in each of the last few blocks, in K."""
         return (self._readings_c[-1] - self._readings_c[-LEAST]) / (LEAST - 1)

@@ -241,6 +241,11 @@ class HeatResponse:
             path.slope += by_per_s * path.off
 
     @property
+    def ripe(self) -> bool:
+        """Whether heat of before the start can be told from what was learnt since."""
+        return self._start.told
+
+    @property
     def moved_k(self) -> float:
         """How far heat has moved the reading that taught the gain, in K."""
         if self.gain is None or not self._blocks:

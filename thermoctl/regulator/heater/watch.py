@@ -159,7 +159,8 @@ class HeaterWatch:
             self._doubt.clear()
             return
         if learns and (self.known is not None or now.reading_c > self._refused_c):
-            self._heater.learn(self._response.gain, now, self._response.moved_k, sd_k)
+            if self._response.ripe:
+                self._heater.learn(self._response.gain, now, self._response.moved_k, sd_k)
             self._heater.follow(block.power, now)
         if before is not None:
             self._follow(block, before, now)
