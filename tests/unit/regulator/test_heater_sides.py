@@ -123,6 +123,13 @@ def test_a_reading_that_stops_is_missed_though_noise_is_more_than_the_cooler_doe
     assert began_c - tank.water_c < 6.0
 
 
+def test_an_unknown_heater_has_no_more_heat_in_pulses_than_at_once():
+    tank = Tank()
+    tank.shows = lambda water_c: 22.0
+    tank.run(400, lambda reading_c: 1.0 if tank.t_s % 60.0 < 30.0 else -0.2)
+    assert len([text for text in tank.told("heater.questioned") if "100%" in text]) == 1
+
+
 def test_what_the_other_one_does_is_neither_missed_nor_learnt():
     tank = known()
     before, rows = tank.watch.heater.known, len(tank.watch.heater._rows)

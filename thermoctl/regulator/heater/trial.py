@@ -64,6 +64,10 @@ class Trial:
         """Give the heat once more that there may be now."""
         self.from_s, self._heat_s, self._lowest_c = t_s, 0.0, math.inf
 
+    def pause(self) -> None:
+        """Go on later with the heat that is left, from another reading."""
+        self._lowest_c = math.inf
+
     def fails(self, power: float, block: Block, now: Seen) -> str:
         """Take in a block that counts as `power`; return why to ask, or nothing."""
         self._lowest_c = min(self._lowest_c, now.reading_c)

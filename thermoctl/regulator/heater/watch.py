@@ -101,6 +101,7 @@ class HeaterWatch:
         """
         if interval_s > self._unknown_s:
             self._lose_track()
+            self._trial.begin(self._t_s)
             return
         if self._repeats.observe(reading_c):
             text = f"expected readings that differ, got {self._repeats.run + 1} equal ones in a row"
@@ -117,6 +118,7 @@ class HeaterWatch:
     def stand_aside(self, under_way_s: float) -> None:
         """Leave the reading to another actuator, whose heat lasts `under_way_s`."""
         self._lose_track()
+        self._trial.pause()
         self._off_s, self._settled_s = 0.0, self._t_s + under_way_s
 
     def _lose_track(self) -> None:
@@ -128,7 +130,6 @@ class HeaterWatch:
         self._doubt.clear()
         self._rows.clear()
         self._cut = None
-        self._trial.begin(self._t_s)
 
     # -- a block ---------------------------------------------------------------------------------
 
