@@ -306,3 +306,45 @@ def test_no_heater_is_known_by_a_rise_of_which_nobody_can_tell_when_its_heat_was
     vessel.warm_up(600)
     assert vessel.watch.known.mean == pytest.approx(vessel.gain, rel=0.3)
     assert vessel.names() == []
+
+
+def disowned(place):
+    """Return a heater of which the gain that was remembered is given up, and one learnt since."""
+    now = Seen(100.0, 30.0, (90.0,) * len(LAGS_S))
+    heater = KnownHeater()
+    heater.recall(Gain(0.02, 0.001, 2))
+    heater.disown()
+    assert heater.gain is None
+    heater.learn(Gain(0.04, 0.001, place), now, 1.0, 0.01)
+    heater.follow(1.0, now)
+    heater.follow(0.0, now)
+    assert heater.seen
+    assert not heater.proven
+    return heater
+
+
+def test_a_lag_that_is_found_again_outlives_the_gain_that_was_remembered_with_it():
+    assert disowned(2).under_way_s == OFF_LAGS * LAGS_S[3]
+    assert disowned(2).over_s == OFF_LAGS * LAGS_S[3] + LAGS_S[3]
+    assert disowned(2).longer_s == LAGS_S[2]
+    for place in (1, 3):
+        assert disowned(place).under_way_s == OFF_LAGS * LAGS_S[-1]
+        assert disowned(place).over_s == OFF_LAGS * LAGS_S[-1] + LAGS_S[place]
+
+
+def test_an_output_that_sticks_on_is_told_as_soon_where_the_gain_remembered_is_given_up():
+    told_s = []
+    for share in (1.0, 0.6):
+        vessel = Vessel(lag_s=20.0).warm_up(900)
+        known = vessel.watch.known
+        vessel.water_c, vessel.first, vessel.second = 25.0, 0.0, 0.0
+        vessel.begin().watch.recall(known._replace(mean=share * known.mean))
+        vessel.warm_up(200)
+        assert vessel.watch._heater.recalled is (share == 1.0)
+        vessel.does = lambda _: 1.0
+        began_s = vessel.t_s
+        while vessel.supervisor.state is not State.LATCHED and vessel.t_s < began_s + 600.0:
+            vessel.warm_up(1)
+        told_s.append(vessel.t_s - began_s)
+    assert "heater.stuck_on" in vessel.names()
+    assert told_s[1] <= told_s[0] + 10.0

@@ -9,7 +9,8 @@ agree with what an earlier run knew has to have moved the reading before it take
 A reading that full power raises by more than it can shows that the memory is of another plant, of
 more water; one that rises so without power would be of a heater stuck on. Such a memory would make
 a gain of the loss, and expect at rest what comes of nothing: it is forgotten, and the heater is one
-that nobody knows.
+that nobody knows. Only its lag is kept, for other water has the same sensor: a lag that an earlier
+run has seen, and this one finds as well, is as good as one that is recalled.
 
 Nor is anything taken for known while it is open what was before the start: heat of before that
 still arrives makes a gain of twice the true one, behind no lag at all.
@@ -66,6 +67,14 @@ class KnownHeater:
         self.recalled = self._obeys = False
         self._most = self._outdone_k = 0.0
         self._eased: Seen | None = None  # when less power began
+        self._once: int | None = None  # place of the lag of a memory that is disowned
+        self._as_once = False  # whether this run finds the same
+
+    def disown(self) -> None:
+        """Forget a memory of another plant, but for its lag: other water has the same sensor."""
+        once = None if self.gain is None else self.gain.place
+        self.forget()
+        self._once = once
 
     def recall(self, gain: Gain) -> None:
         """Begin with what an earlier run knew, by powers that moved."""
@@ -141,6 +150,8 @@ class KnownHeater:
         """See whether the reading obeys less `power`, in a block without a doubt."""
         self._most = max(self._most, power)
         gain, start = self.gain, self._eased
+        if gain is not None and power >= EASED * self._most:  # one stuck on teaches any lag later
+            self._as_once = gain.place == self._once
         if gain is None or self._obeys or power >= EASED * self._most:
             self._eased = None
         elif start is None:
@@ -167,7 +178,19 @@ class KnownHeater:
     @property
     def under_way_s(self) -> float:
         """How long after the power heat of before may still arrive."""
-        return OFF_LAGS * (self.longer_s if self._obeys else LAGS_S[-1])
+        return OFF_LAGS * (self._next_s if self._obeys or self._as_once else LAGS_S[-1])
+
+    @property
+    def over_s(self) -> float:
+        """How long after the power a rise is none of its heat, whatever the reading does."""
+        return self.under_way_s + self._next_s
+
+    @property
+    def _next_s(self) -> float:
+        """The lag; the next longer one where it is an earlier run that has seen it."""
+        if self._as_once and not self._obeys and self._once is not None:
+            return LAGS_S[min(self._once + 1, len(LAGS_S) - 1)]
+        return self.longer_s
 
 
 def arrived(gain: Gain, now: Seen) -> bool:

@@ -184,7 +184,7 @@ class HeaterWatch:
 
     def _disown(self, now: Seen) -> None:
         """Go on with a heater that nobody knows: what was remembered is of another plant."""
-        self._heater.forget()
+        self._heater.disown()
         self._ceiling.clear()
         self._doubt, self._distrusted_k = HeatDoubt(), 0.0
         self._trial.begin(now.t_s)
@@ -316,7 +316,7 @@ class HeaterWatch:
 
     def _heated(self, known: Gain, now: Seen, sd_k: float, t_s: float) -> bool:
         """Return whether the reading has risen long after the power went, and latch that."""
-        if self._off_s <= self._heater.under_way_s + self._heater.longer_s:
+        if self._off_s <= self._heater.over_s:
             return False
         rate = self._rising(known, now, sd_k)
         heated = rate > RISES * known.mean
