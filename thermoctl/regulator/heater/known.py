@@ -71,7 +71,7 @@ class KnownHeater:
         self._as_once = False  # whether this run finds the same
 
     def disown(self) -> None:
-        """Forget a memory of another plant, but for its lag: other water has the same sensor."""
+        """Forget a memory of another plant, but for its lag."""
         once = None if self.gain is None else self.gain.place
         self.forget()
         self._once = once
@@ -182,7 +182,7 @@ class KnownHeater:
 
     @property
     def over_s(self) -> float:
-        """How long after the power a rise is none of its heat, whatever the reading does."""
+        """How long after the power a rise is none of its heat."""
         return self.under_way_s + self._next_s
 
     @property
