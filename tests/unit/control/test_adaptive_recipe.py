@@ -26,7 +26,8 @@ class Filter:
     P: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
     K: np.ndarray = field(default_factory=lambda: np.zeros(4))
     S: float = 0.0
-    knew: float = 0.0
+    sure: bool = False
+    knew: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
 
     def __post_init__(self):
         pipe = self.shape is None  # and what is beyond heater and sensor, 20 s of both, is dead
@@ -63,7 +64,7 @@ class Filter:
         self.grow(self.x[0] - before)
         if steady:
             return
-        self.knew = self.P[2, 2]
+        self.knew = self.P
         self.P = F @ self.P @ F.T + self.h * np.diag(noise)
         if self.arrives(t_s):
             ridge = np.array([0, 0, 1, 1]) * 0.08 * self.x[3] * self.q
@@ -82,7 +83,8 @@ class Filter:
         if not steady:
             self.S = self.P[1, 1] + R
             self.K = self.P[:, 1] / self.S
-            self.K[3] *= e if self.P[3, 3] <= (0.1 * self.x[3]) ** 2 else 1.0
+            self.sure = self.P[3, 3] <= (0.1 * self.x[3]) ** 2
+            self.K[3] *= e if self.sure else 1.0
         S, K = self.S, self.K
         self.x = self.x + K * nu
         if settling:
@@ -225,13 +227,17 @@ class PlainBank:
     def settle(self, m, before):
         """See whether the gains have come to stand; if so, they are good for fourteen samples."""
         for each in self.filters if before is not None and self.missed else ():
-            share = min(max(each.P[2, 2] / each.knew, 0.97), 1.03)
+            share = min(max(each.P[2, 2] / each.knew[2, 2], 0.97), 1.03)
+            each.P[3, 3] += self.missed * max(each.P[3, 3] - each.knew[3, 3], 0.0)
             scale = np.diag([1.0, 1.0, share ** (self.missed / 2), 1.0])
             each.P, each.K = scale @ each.P @ scale, scale @ each.K
         self.missed = self.kept = 0
         self.bound = [each.K[2] * each.S for each in self.filters]
         if before is not None:
-            self.settled = abs(self.bound[m] - before[m]) <= 0.05 * abs(self.bound[m])
+            share = np.exp([each.ln_w for each in self.filters])
+            share = share @ [each.sure for each in self.filters] / share.sum()
+            moved = abs(self.bound[m] - before[m])
+            self.settled = share >= 0.9 and moved <= 0.05 * abs(self.bound[m])
 
     def listen(self, nu, silent):
         limit = 3 * math.sqrt(max(self.means[2], 1e-5))

@@ -340,8 +340,7 @@ class Bank:
         gains = None if belief.gains is None else belief.gains.older(kept=False)
         if not still or drifting.disturbed or (gains is not None and gains.fresh):
             return gains
-        m = belief.weights.likeliest
-        return reckoned(gains, step, belief.block, m, self.constants)
+        return reckoned(gains, step, belief.block, belief.weights, self.constants)
 
     def _drifted(self, belief: BankBelief, still: bool, sds: float) -> Drifting:
         """Return the sums after an innovation of so many standard deviations."""

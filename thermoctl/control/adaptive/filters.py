@@ -302,7 +302,7 @@ def corrected(
     g /= np.sqrt(S)  # P H' / sqrt S, and beside it -nu / sqrt S
     after = g[:X, None] * g
     if proof < 1.0:  # of beta K = p g / sqrt S: Joseph's form differs from P - g g' here alone
-        known, P, x = _known(block, constants), after[BETA, BETA], after[BETA, X]
+        known, P, x = gain_known(block, constants), after[BETA, BETA], after[BETA, X]
         np.multiply(P, proof * (2.0 - proof), out=P, where=known)
         np.multiply(x, proof, out=x, where=known)
     np.subtract(block, after, out=after)  # P - g g', x + g nu / sqrt S
@@ -317,14 +317,14 @@ def followed(block: Block, y_c: float, K: Array) -> Block:
     return after
 
 
-def gains_at_rest(block: Block, S: Array, constants: PerPeriod) -> Array:
+def gains_at_rest(block: Block, S: Array, known: npt.NDArray[np.bool_]) -> Array:
     """Return the gains K of the states, shape (4, n), those of `corrected` at rest."""
     K: Array = block[Z, :X] / S
-    K[BETA, _known(block, constants)] = 0.0
+    K[BETA, known] = 0.0
     return K
 
 
-def _known(block: Block, constants: PerPeriod) -> npt.NDArray[np.bool_]:
+def gain_known(block: Block, constants: PerPeriod) -> npt.NDArray[np.bool_]:
     """Return of which hypotheses the gain beta is known, shape (n,)."""
     most = constants.known_share * block[BETA, X]
     most *= most
@@ -335,10 +335,13 @@ def _known(block: Block, constants: PerPeriod) -> npt.NDArray[np.bool_]:
 def caught_up(block: Block, before: Block, samples: int) -> Array:
     """Let P go on for `samples` more as it has from `before` to `block`; in place.
 
-    At rest the loss alone is still becoming better known or worse, by some share in every sample.
-    Scaled by the square root of that share in row and column P stays positive and its correlations
-    what they are. Returned is by what the gain of the loss is larger for it, shape (n,).
+    At rest the loss is still becoming better known or worse, by some share in every sample. Scaled
+    by the square root of that share in row and column P stays positive and its correlations what
+    they are. And gains are slowly forgotten, by as much in every sample. Returned is by what the
+    gain K of the loss is larger for it, shape (n,).
     """
+    BB = block[BETA, BETA]
+    BB += samples * np.maximum(BB - before[BETA, BETA], 0.0)
     share = np.minimum(np.maximum(block[D, D] / before[D, D], 1.0 - CAUGHT_UP), 1.0 + CAUGHT_UP)
     scale: Array = share ** (0.5 * samples)
     block[D, :X] *= scale

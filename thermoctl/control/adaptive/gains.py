@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from thermoctl.control.adaptive import filters
+from thermoctl.control.adaptive.evidence import Weights
 from thermoctl.control.adaptive.filters import Block, D, PerPeriod
 from thermoctl.quantities import Array
 
@@ -21,6 +22,9 @@ GOOD_SAMPLES = 14
 SETTLED = 0.05
 """They have settled when what binds the loss to the reading, K S, has changed by no more than this
 share since they were reckoned before: it is the slowest, and R, which wanders, does not count."""
+KNOWN = 0.9
+"""And when so much of the weight is on hypotheses that know the gain of the plant: where it is not
+known, rest is still telling of it, and binding it to the loss."""
 
 
 class Gains(NamedTuple):
@@ -66,20 +70,22 @@ def reckoned(
     before: Gains | None,
     step: Corrected,
     last: Block | None,
-    likeliest: int,
+    weights: Weights,
     constants: PerPeriod,
 ) -> Gains:
     """Return the gains of a `step` of rest, after those that were reckoned `before`.
 
     Its block is given what P has missed since it was left alone, as in the `last` one; in place.
     """
-    S, K = step.S, filters.gains_at_rest(step.predicted, step.S, constants)
+    S, known = step.S, filters.gain_known(step.predicted, constants)
+    K = filters.gains_at_rest(step.predicted, S, known)
     if before is not None and before.kept and last is not None:
         K[D] *= filters.caught_up(step.block, last, before.kept)
     for array in (K, S):
         array.setflags(write=False)
     if before is None:
         return Gains(K, S)
-    now = K.item(D, likeliest) * S.item(likeliest)
-    then = before.K.item(D, likeliest) * before.S.item(likeliest)
-    return Gains(K, S, 0, 0, abs(now - then) <= SETTLED * abs(now))
+    m = weights.likeliest
+    now, then = K.item(D, m) * S.item(m), before.K.item(D, m) * before.S.item(m)
+    settled = abs(now - then) <= SETTLED * abs(now) and float(weights.share.dot(known)) >= KNOWN
+    return Gains(K, S, 0, 0, settled)
