@@ -82,7 +82,7 @@ class PerPeriod(NamedTuple):
         Variances of T and beta that a period adds, over the square of the gain.
     noise_loss : float
         That of d at rest.
-    unrest, room_k, known_share : float
+    unrest, known_share : float
         As in `Plants`.
     noise_sensor : ndarray, shape (n,)
         Variance of z that it adds.
@@ -90,6 +90,8 @@ class PerPeriod(NamedTuple):
         Least gain of which the noise is taken.
     gain_min, gain_max, loss_min, loss_max : ndarray, shape (n,)
         Limits of the gain, and those of the loss in gains.
+    per_room_k, no_loss : ndarray, shape (n,)
+        One over `Plants.room_k`, and 0.
     power_min, power_max : ndarray, shape (n,)
         Least and most power.
     """
@@ -100,7 +102,6 @@ class PerPeriod(NamedTuple):
     noise_gain: Array
     noise_loss: float
     unrest: float
-    room_k: float
     known_share: float
     noise_sensor: Array
     gain_noisy: Array
@@ -108,6 +109,8 @@ class PerPeriod(NamedTuple):
     gain_max: Array
     loss_min: Array
     loss_max: Array
+    per_room_k: Array
+    no_loss: Array
     power_min: Array
     power_max: Array
 
@@ -126,7 +129,8 @@ def per_period(hypotheses: Hypotheses, plants: Plants, u_min: float, u_max: floa
         noise_gain=plants.gain_drift**2 * h * one,
         noise_loss=plants.loss_drift**2 * h,
         unrest=plants.unrest,
-        room_k=plants.room_k,
+        per_room_k=one / plants.room_k,
+        no_loss=0.0 * one,
         known_share=plants.known_share,
         noise_sensor=plants.sensor_drift_k**2 * h * one,
         gain_noisy=GAIN_LEAST * h * one,
@@ -233,7 +237,9 @@ def grown(block: Block, moved_k: Array, constants: PerPeriod) -> None:
     heat from a warmer room: only who heats and cools has it.
     """
     loss = block[D, X]
-    loss += np.maximum(loss, 0.0) * np.tanh(moved_k / constants.room_k)
+    grows = np.tanh(moved_k * constants.per_room_k)
+    grows *= np.maximum(loss, constants.no_loss)
+    loss += grows
 
 
 def arrivals(hypotheses: Hypotheses, plants: Plants) -> Mapping[int, Array]:
