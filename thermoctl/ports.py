@@ -163,6 +163,9 @@ class Situation:
     commanded : float
         Power that was commanded for that interval, whoever asked for it: what limits have left of
         it. An output that is not exact makes `applied` of it. NaN where nobody said.
+    kept_s : float
+        Time constant in s with which what acts comes down when power is taken back: a block keeps
+        its heat. 0 for a heater without one, whose heat is under way in what is controlled.
     """
 
     t_s: float
@@ -177,6 +180,7 @@ class Situation:
     setpoint_rate_k_per_s: float = 0.0
     target_c: float = math.nan
     commanded: float = math.nan
+    kept_s: float = 0.0
 
 
 @runtime_checkable

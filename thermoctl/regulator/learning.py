@@ -41,6 +41,8 @@ class Learning:
         self._belief: IdentifierBelief = identifier.start()
         self._foreseen: IdentifierBelief | None = None
         self._holding = Holding()
+        self.kept_s = 0.0
+        """Time constant with which what acts comes down when power is taken back, in s."""
 
     @property
     def estimate(self) -> Estimate:
@@ -98,6 +100,7 @@ class Learning:
             reference.rate_k_per_s,
             reference.target_c,
             commanded,
+            self.kept_s,
         )
 
     def pole(self, t_s: float) -> Pole:

@@ -75,26 +75,23 @@ class Regulator:
         remembered: Mapping[str, Remembered] = NOTHING,
     ) -> None:
         self.plan = plan
-        self._limits = plan.limits
+        self._limits = limits = plan.limits
         self._events: list[tuple[str, dict[str, object]]] = []
         rate_k_per_s = plan.setpoint_rate_k_per_s
         self._wishes = Wishes(plan.limits, plan.setpoint_c, plan.mode, self._emit, rate_k_per_s)
         self._supervisor = Supervisor(plan.limits, self._emit)
         self._guard = Guard(self._supervisor)
         self._steering = Steering(Mind(plan.controller), self._guard, self._emit)
-        limits = plan.limits
         self._shadow = Shadow(plan.shadow, limits.power_min, limits.power_max, self._emit)
         self._learning = Learning(plan.identifier, self._supervisor, self._guard)
         self._feasibility = balance_for(plan.limits, self._supervisor.alarms, self._emit)
         self._load = KnownLoad(self._emit)
-        self._pairing = Pairing(
-            plan.limits, plan.disagreement_k, self._supervisor.alarms, self._emit
-        )
+        self._pairing = Pairing(limits, plan.disagreement_k, self._supervisor.alarms, self._emit)
         self._watch: Watch | None = None
         if plan.heater_check is not None:
-            period_s = plan.limits.period_s
-            self._watch = watch_for(plan.heater_check, period_s, self._supervisor, self._emit)
-        self._jump_k = plan.limits.jump_k
+            check = plan.heater_check
+            self._watch = watch_for(check, limits.period_s, self._supervisor, self._emit)
+        self._jump_k = limits.jump_k
         self._t_s: float | None = None
         self._command = Command(0.0, -math.inf, "start")
         self._applied: float | None = None
@@ -231,8 +228,9 @@ class Regulator:
         self._applied = None
         return self._finish(measurement, situation, beliefs, load)
 
-    def applied(self, power: float) -> None:
-        """Tell which power the actuator took; when never told, it took the command's."""
+    def applied(self, power: float, kept_s: float = 0.0) -> None:
+        """Tell which power the actuator took, else the command's, and how slowly that falls."""
+        self._learning.kept_s = kept_s
         known = is_finite_number(power)
         taken = float(power) if known else math.nan
         self._supervisor.check_applied(self._command.power, taken, self._t_s or 0.0)

@@ -1,10 +1,14 @@
-"""Loops that give others their set points: who is first, and what is handed on."""
+"""Loops that give others their set points: who is first, what is handed on, and what comes back."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 
+from thermoctl.runtime.lead import Lead
+from thermoctl.runtime.store import Store
 from thermoctl.runtime.wiring import Wiring
+from thermoctl.signals import Measurement, Quality
 
 
 def outer_first(wirings: Iterable[Wiring]) -> tuple[Wiring, ...]:
@@ -25,3 +29,50 @@ def hand_down(wiring: Wiring, power: float, wirings: Mapping[str, Wiring]) -> No
         setpoint_c = wiring.lead.setpoint_c(power)
         inner = wirings[wiring.lead.inner].regulator
         inner.lead(setpoint_c, released=wiring.regulator.released)
+
+
+class Cascade:
+    """Tells loops that lead others what those gave, and what they still hold.
+
+    Parameters
+    ----------
+    wirings : iterable of Wiring
+        All loops.
+    """
+
+    def __init__(self, wirings: Iterable[Wiring]) -> None:
+        named = {each.name: each for each in wirings}
+        self._leads = [(each, each.lead) for each in named.values() if each.lead is not None]
+        followers = [named[lead.inner] for _, lead in self._leads]
+        self._stores = {each.name: Store() for each in followers if _only_heats(each)}
+        self.gave: Mapping[str, float] = {}
+        """Power that each loop gave in the last cycle; NaN: not known."""
+
+    def tell(self, seen: Mapping[str, Measurement]) -> dict[str, float]:
+        """Return what each loop that leads another one really gave, after telling its regulator."""
+        return {outer.name: self._told(outer, lead, seen) for outer, lead in self._leads}
+
+    def _told(self, outer: Wiring, lead: Lead, seen: Mapping[str, Measurement]) -> float:
+        bath, block = seen[outer.name], seen[lead.inner]
+        taken = lead.taken(bath, block)
+        if math.isfinite(taken):
+            outer.regulator.applied(taken, self._kept_s(lead.inner, block, bath))
+        return taken
+
+    def _kept_s(self, inner: str, block: Measurement, bath: Measurement) -> float:
+        """Return for how long a block goes on giving heat that it holds."""
+        if inner not in self._stores:
+            return 0.0
+        power = self.gave.get(inner, math.nan)
+        block_c, bath_c = (
+            each.temperature_c if each.quality is Quality.GOOD else math.nan
+            for each in (block, bath)
+        )
+        store = self._stores[inner].after(block.t_s, power, block_c, bath_c)
+        self._stores[inner] = store
+        return store.lasts_s
+
+
+def _only_heats(wiring: Wiring) -> bool:
+    """Return whether the power of a loop is heat, and nothing but the plant takes it back."""
+    return len(wiring.outputs) == 1 and not wiring.regulator.plan.limits.power_cools

@@ -19,9 +19,8 @@ from thermoctl.errors import DriverError, FaultError, LinkError, Refused
 from thermoctl.ports import Clock
 from thermoctl.regulator.limits import command_lasts_s
 from thermoctl.runtime.asked import Asked
-from thermoctl.runtime.cascade import hand_down, outer_first
+from thermoctl.runtime.cascade import Cascade, hand_down, outer_first
 from thermoctl.runtime.connection import Connection
-from thermoctl.runtime.lead import Lead
 from thermoctl.runtime.wiring import Input, Output, Wiring, signed
 from thermoctl.signals import Cycle, Event, Measurement, Quality, RawSample, Request, Step
 
@@ -83,6 +82,7 @@ class Loop:
         self._failure = ""
         self._stopping = False
         self._begun_s = math.inf
+        self._cascade = Cascade(self.wirings)
         self.cycles = 0
         self.missed = 0
 
@@ -164,7 +164,7 @@ class Loop:
         if self._awaits():
             return  # no reading is missing yet, and no output is on
         seen = {w.name: self._see(w, samples) for w in self.wirings}
-        led = {w.name: self._led(w, w.lead, seen) for w in self.wirings if w.lead is not None}
+        led = self._cascade.tell(seen)
         walked = []
         for wiring in self.wirings:
             begin_ns = time.thread_time_ns()
@@ -172,6 +172,7 @@ class Loop:
             walked.append((wiring, step, (time.thread_time_ns() - begin_ns) / 1000.0))
             hand_down(wiring, step.command.power, self._named)
         accepted = self._write({wiring.name: step for wiring, step, _ in walked}) | led
+        self._cascade.gave = accepted
         events = self.take_events()
         for wiring, step, tick_us in walked:
             taken = accepted[wiring.name]
@@ -229,13 +230,6 @@ class Loop:
         return replace(
             measurement, t_s=now_s, quality=Quality.STALE if old else measurement.quality
         )
-
-    def _led(self, wiring: Wiring, lead: Lead, seen: Mapping[str, Measurement]) -> float:
-        """Return what a loop that leads another one really gave, after telling its regulator."""
-        taken = lead.taken(seen[wiring.name], seen[lead.inner])
-        if math.isfinite(taken):
-            wiring.regulator.applied(taken)
-        return taken
 
     def _write(self, steps: Mapping[str, Step]) -> dict[str, float]:
         """Give every board its drives in one exchange; return the accepted power by loop."""

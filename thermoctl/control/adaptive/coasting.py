@@ -131,6 +131,7 @@ def power_for(
     before: float,
     ramp_power: float = 0.0,
     pace: Pace = USUAL,
+    kept_s: float = 0.0,
 ) -> float:
     """Return the power that lets the water come to rest at the set point within Tc.
 
@@ -152,6 +153,8 @@ def power_for(
         What lets the water rise with a ramp, beside the holding power.
     pace : Pace
         The constants of this law.
+    kept_s : float
+        Time constant with which what acts comes down when power is taken back.
     """
     floor_s = math.hypot(pace.lag_floor_s, pace.lag_floor_share * outlook.lag_s)
     doubt_k = outlook.gain * math.hypot(outlook.lag_sd_s, floor_s)
@@ -167,6 +170,8 @@ def power_for(
     error_k = _agreed(setpoint_c - aim_c, outlook.spread_k, bounds, pace)
     gain_sd = min(outlook.gain_sd, pace.vague_k_per_s)
     gain = outlook.gain + max(gain_sd - pace.vague_share * outlook.gain, 0.0)
+    if error_k > 0.0:  # power above the resting one is heat for as long as it takes to come down
+        Tc_s += kept_s
     wanted = resting + error_k / (gain * Tc_s)
     return clamp(before + (wanted - before) * period_s / (period_s + tau_s), *bounds)
 

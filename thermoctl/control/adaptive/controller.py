@@ -222,7 +222,15 @@ class Adaptive:
             r_c, rate = ahead(r_c, rate, end_c, outlook.lag_s)
             ramp_heat = rate / outlook.gain
         heat = power_for(
-            outlook, r_c, self.calmness, self.period_s, bounds, before, ramp_heat, self.pace
+            outlook,
+            r_c,
+            self.calmness,
+            self.period_s,
+            bounds,
+            before,
+            ramp_heat,
+            self.pace,
+            situation.kept_s,
         )
         return belief, belief.inexact.made_up_for(self._power(heat))
 

@@ -1,0 +1,22 @@
+"""Power above the resting one, where a block keeps what it has got."""
+
+import pytest
+
+from thermoctl.control.adaptive.coasting import Outlook, power_for
+
+BOUNDS = (-9.0, 9.0)  # far from any answer below
+
+
+def answer(error_k, kept_s, before=0.2):
+    """Return by how much power is above the resting one, 0.2, with such an error."""
+    outlook = Outlook(37.5 - error_k, holding_power=0.2, lag_s=20.0, gain=0.036)
+    return power_for(outlook, 37.5, 0.4, 1.0, BOUNDS, before, kept_s=kept_s) - 0.2
+
+
+def test_power_that_takes_as_long_to_come_down_as_the_error_has_is_half_as_much():
+    assert answer(0.05, kept_s=8.0) == pytest.approx(0.5 * answer(0.05, kept_s=0.0))
+    assert answer(0.05, kept_s=72.0) == pytest.approx(0.1 * answer(0.05, kept_s=0.0))
+
+
+def test_what_a_block_keeps_is_no_reason_to_leave_more_on_above_the_set_point():
+    assert answer(-0.05, kept_s=60.0) == answer(-0.05, kept_s=0.0) < 0.0
