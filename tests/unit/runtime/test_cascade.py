@@ -9,7 +9,7 @@ import pytest
 from thermoctl.app.compose import loop_for
 from thermoctl.app.settings import load
 from thermoctl.errors import Refused
-from thermoctl.runtime.cascade import outer_first
+from thermoctl.runtime.cascade import Cascade, outer_first
 from thermoctl.runtime.lead import Lead
 from thermoctl.signals import ManualPower, Measurement, Mode, Quality, SetPoint, State
 from thermoctl.testing import ManualClock
@@ -170,3 +170,44 @@ def test_a_block_that_fails_leaves_the_bath_running_and_nothing_wound_up():
 def test_a_loop_that_leads_makes_up_for_nothing_that_the_other_is_behind():
     bench = Bench().run(60)
     assert bench.regulator("bath")._steering.mind.belief.inexact.more == 0.0
+
+
+def test_the_bath_is_told_for_how_long_the_block_goes_on_before_it_was_ever_told_to_fall():
+    bench = Bench(element_lag_s=60.0).run(60)
+    learning = bench.regulator("bath")._learning
+    assert bench.block.step.setpoint_c == 80.0  # up to now it was asked for all there is
+    assert learning.kept_s == pytest.approx(60.0, rel=0.15)
+    known_s = learning.kept_s
+    bench.regulator("block").fault("test.fault", None, "test")
+    bench.run(120)
+    assert learning.kept_s == pytest.approx(known_s, rel=0.15)  # it fell, and told the same
+    assert bench.regulator("block")._learning.kept_s == 0.0  # nobody follows that one
+
+
+def follower(**what):
+    """Return a loop that follows another one, and how long that was told the heat lasts."""
+    limits = SimpleNamespace(power_cools=what.pop("cools", False))
+    regulator = SimpleNamespace(plan=SimpleNamespace(limits=limits))
+    told = []
+    outer = SimpleNamespace(applied=lambda power, kept_s: told.append(kept_s))
+    lead = Lead("block", 20.0, 80.0)
+    bath = SimpleNamespace(name="bath", regulator=outer, outputs=(), lead=lead)
+    outputs = (object(),) * what.pop("outputs", 1)
+    block = SimpleNamespace(name="block", regulator=regulator, outputs=outputs, lead=None)
+    return Cascade((bath, block)), told
+
+
+@pytest.mark.parametrize(("what", "known"), [
+    ({}, True), ({"outputs": 2}, False), ({"outputs": 0}, False), ({"cools": True}, False),
+])  # fmt: skip
+def test_a_block_holds_heat_where_nothing_but_a_heater_acts_on_it(what, known):
+    cascade, told = follower(**what)
+    block_c = 25.0
+    for second in range(120):
+        cascade.tell({
+            "bath": Measurement(float(second), 25.0), "block": Measurement(float(second), block_c),
+        })  # fmt: skip
+        cascade.gave = {"block": 1.0}
+        block_c += (85.0 - block_c) / 60.0
+    assert told[0] == 0.0
+    assert told[-1] == (pytest.approx(60.0, rel=0.05) if known else 0.0)

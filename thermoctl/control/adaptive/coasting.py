@@ -22,6 +22,11 @@ which is the law above for where the ramp will be when the heat of now is read. 
 the ramp and the water ahead of it. The other way round would be better, but no power tells the lag
 of a sensor from that of a heater, and the error would be what the one is taken for the other.
 
+What acts may be a block that comes down with a time constant :math:`\tau_b` when power is taken
+back. Power above the resting one then brings :math:`\beta\,\tau_b\,(u - u_{ss})` more than it does
+while it lasts. That has to fit into the error too: on the way up :math:`T_c + \tau_b` stands for
+:math:`T_c` in it, and a power that is to come down does so without the lag :math:`\tau`.
+
 Implements section 9 of ``docs/theory.md``.
 """
 
@@ -170,10 +175,14 @@ def power_for(
     error_k = _agreed(setpoint_c - aim_c, outlook.spread_k, bounds, pace)
     gain_sd = min(outlook.gain_sd, pace.vague_k_per_s)
     gain = outlook.gain + max(gain_sd - pace.vague_share * outlook.gain, 0.0)
-    if error_k > 0.0:  # power above the resting one is heat for as long as it takes to come down
+    keeps = kept_s > 0.0 and error_k > 0.0
+    if keeps:  # power above the resting one is heat for as long as it takes to come down
         Tc_s += kept_s
     wanted = resting + error_k / (gain * Tc_s)
-    return clamp(before + (wanted - before) * period_s / (period_s + tau_s), *bounds)
+    power = before + (wanted - before) * period_s / (period_s + tau_s)
+    if keeps:  # what comes down late is not told late as well
+        power = min(power, wanted)
+    return clamp(power, *bounds)
 
 
 def _counted(surplus: float, swing_k: float, pace: Pace) -> float:
