@@ -22,6 +22,9 @@ class Bath:
         self.clock, self.cycles = ManualClock(), []
         self.loop = loop_for(settings, self.clock, self.cycles.append, beside=False)
         self.run(settled_s)
+        for _ in range(30):  # a block that has to cool down gets nothing for some seconds
+            if self.board.truth()["heater_w"] == 0.0:
+                self.run(1)
         assert self.board.truth()["heater_w"] > 0.0
 
     @property
