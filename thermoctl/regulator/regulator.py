@@ -229,7 +229,7 @@ class Regulator:
         return self._finish(measurement, situation, beliefs, load)
 
     def applied(self, power: float, kept_s: float = 0.0) -> None:
-        """Tell which power the actuator took, else the command's, and how slowly that falls."""
+        """Tell which power was taken, else the command's, and how slowly that falls."""
         self._learning.kept_s = kept_s
         known = is_finite_number(power)
         taken = float(power) if known else math.nan

@@ -1,4 +1,4 @@
-"""Loops that give others their set points: who is first, what is handed on, and what comes back."""
+"""Loops that give others their set points: what is handed on and comes back."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Cascade:
         """Power that each loop gave in the last cycle; NaN: not known."""
 
     def tell(self, seen: Mapping[str, Measurement]) -> dict[str, float]:
-        """Return what each loop that leads another one really gave, after telling its regulator."""
+        """Tell each loop that leads another one what it really gave, and return that."""
         return {outer.name: self._told(outer, lead, seen) for outer, lead in self._leads}
 
     def _told(self, outer: Wiring, lead: Lead, seen: Mapping[str, Measurement]) -> float:

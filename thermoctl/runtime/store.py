@@ -1,4 +1,4 @@
-r"""Heat that a block still holds, and for how long it goes on giving it to what it heats.
+r"""Heat that a block still holds, and for how long it goes on giving it.
 
 A block can be told to be colder, but it cools down only as fast as it gives its heat away. With a
 heater that gives :math:`K\,p` at power p, in K by which it would keep the block above the bath,
@@ -65,7 +65,7 @@ class Store(NamedTuple):
     sums: Sums = Sums()
 
     def after(self, t_s: float, power: float, block_c: float, bath_c: float) -> Store:
-        """Return the same after `power` until `t_s`, and the two readings of then, in degC.
+        """Return the same after `power` until `t_s` and two readings of then, in degC.
 
         What is not finite is a gap: the filters begin anew, and what is known stays.
         """
@@ -83,7 +83,7 @@ class Store(NamedTuple):
 
     @property
     def lasts_s(self) -> float:
-        """Time constant with which the block gives its heat away, in s; 0 until it is known."""
+        """Time constant with which the block gives its heat away, in s; 0: not known."""
         n, pp, pr, rr, pa, ra = self.sums
         apart = pp * rr - pr * pr
         if n < ENOUGH or apart <= APART * pp * rr:
