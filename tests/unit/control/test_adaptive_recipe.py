@@ -320,7 +320,11 @@ def eventful(samples, h, seed):
 
 @pytest.mark.parametrize(
     ("h", "u_min", "samples"),
-    [pytest.param(1.0, 0.0, 2500, marks=pytest.mark.slow), (5.0, 0.0, 500), (0.4, -0.3, 600)],
+    [
+        pytest.param(1.0, 0.0, 2500, marks=pytest.mark.slow),
+        (5.0, 0.0, 500),
+        pytest.param(0.4, -0.3, 600, marks=pytest.mark.slow),
+    ],
 )
 def test_every_step_is_that_of_filters_run_one_by_one(h, u_min, samples):
     bank, plain = Bank(h, u_min), PlainBank(h, u_min)

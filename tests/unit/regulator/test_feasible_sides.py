@@ -51,6 +51,7 @@ class Tank:
         return step
 
 
+@pytest.mark.slow
 def test_what_the_cooler_cannot_hold_is_told_with_the_lowest_temperature_it_can():
     tank = Tank(5.0)
     step = tank.run(5400)

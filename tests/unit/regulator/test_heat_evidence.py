@@ -15,6 +15,7 @@ from thermoctl.signals import Measurement, State
 
 GAIN, SPAN_S, SD_K = Gain(0.045, 0.001, 2), 4.0, 0.01
 LOAD = 0.2 * GAIN.mean
+SEEDS = (0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2, 3)))
 
 
 def rows(power, load_of, seconds=240, *, beta=GAIN.mean, seed=1):
@@ -49,12 +50,12 @@ def from_40_s(t_s):
     return LOAD if t_s >= 40 else 0.0
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_reading_that_dips_and_is_brought_back_says_that_the_heater_is_sound(seed):
     assert odds(rows(answering, from_40_s, seed=seed), 0.0, GAIN, SD_K) > SOUND
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_reading_that_stands_still_under_power_that_creeps_says_that_it_is_dead(seed):
     def creeping(t_s):
         return 0.1 + 0.001 * t_s if t_s < 180 else 0.0
@@ -63,7 +64,7 @@ def test_a_reading_that_stands_still_under_power_that_creeps_says_that_it_is_dea
     assert odds(stood, 0.0, GAIN, SD_K) < -SURE
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_load_that_ends_at_the_moment_of_the_cut_does_not_condemn_a_heater(seed):
     def till_the_cut(t_s):
         return LOAD if 40 <= t_s < 190 else 0.0
@@ -141,7 +142,7 @@ def test_a_load_that_comes_and_goes_condemns_no_heater(load_share, half_s):
         assert tank.lowest_c > 36.9
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3))])
 def test_a_load_that_stays_and_is_made_up_for_is_no_question(seed):
     tank = Tank(seed).run(1500)
     tank.run(900, lambda _: 0.1)

@@ -59,7 +59,7 @@ class Kettle:
         return [t_s for t_s, each, _ in self.events if each == name]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3))])
 def test_a_kettle_that_boils_is_not_latched_but_told_that_it_gets_no_warmer(seed: int) -> None:
     kettle = Kettle(seed).run(3000)
     assert "latched" not in kettle.states

@@ -53,7 +53,7 @@ class Pocket:
         return self
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3))])
 def test_cold_water_on_a_lag_that_has_grown_condemns_no_heater(seed: int) -> None:
     pocket = Pocket(seed).run(1500)
     pocket.pole_s = 62.0

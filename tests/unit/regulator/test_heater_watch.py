@@ -251,6 +251,7 @@ def test_much_noise_raises_no_doubt():
     assert plant.names() == []
 
 
+@pytest.mark.slow
 def test_a_heater_that_noise_hides_is_asked_and_not_condemned():
     asked = 0
     for seed in (0, 1, 2):
