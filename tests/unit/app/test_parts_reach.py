@@ -29,6 +29,7 @@ def holding(sensor: dict, **limits: float) -> dict:
 
 
 @pytest.mark.parametrize("settings", CURVES, ids=str)
+@pytest.mark.slow
 def test_no_reading_lies_outside_the_reach_and_some_lie_at_its_ends(settings):
     sensor = sensor_for(SensorTable(board="daq", **settings))
     measured = [sensor.measure(RawSample(0.0, counts, 65536.0)) for counts in range(65536)]

@@ -36,6 +36,7 @@ def test_a_tank_stands_in_that_heats_as_fast_as_the_model_says(gain_k_per_s):
 
 
 @pytest.mark.parametrize("curve", ["lm335", "pt100", "ntc"])
+@pytest.mark.slow
 def test_a_tank_that_stands_in_is_held_whatever_sensor_the_real_one_has(curve):
     cycles = list(simulate(configured(curve=curve), 1200.0, seed=1))
     assert cycles[-1].truth["true_temperature_c"] == pytest.approx(30.0, abs=0.3)

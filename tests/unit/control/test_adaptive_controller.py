@@ -320,6 +320,7 @@ def test_six_quiet_hours_leave_the_gain_where_it_was_learnt():
 
 @pytest.mark.parametrize("first_c", [85.0, 0.0, -40.0])
 @pytest.mark.parametrize("samples", [1, 5])
+@pytest.mark.slow
 def test_nonsense_in_the_first_readings_is_forgotten_within_the_warm_up(first_c, samples):
     law, vessel, waters = Adaptive(), Vessel(), []
     belief, power, y = law.start(), 0.0, 25.0

@@ -61,6 +61,7 @@ def settled_s(waters, r):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.slow
 def test_a_slow_plant_that_began_beside_cold_glass_steps_at_the_pace_of_its_lag(seed):
     _, (_, after) = held(seed, (37.5, 40.0))
     assert after.max() < 40.1

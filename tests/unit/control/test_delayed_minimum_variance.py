@@ -59,6 +59,7 @@ def test_without_past_outputs_the_model_still_looks_over_its_delay():
 
 
 @pytest.mark.parametrize("d", [1, 3, 6])
+@pytest.mark.slow
 def test_the_variance_is_that_of_the_noise_that_no_power_could_have_met(d):
     steps, sigma = 8000, 0.1
     noise = sigma * np.random.default_rng(d).normal(size=steps)

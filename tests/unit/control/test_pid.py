@@ -57,6 +57,7 @@ class Loop:
 
 
 @pytest.mark.parametrize("damping", [0.5, 0.7, 1.0, 1.5])
+@pytest.mark.slow
 def test_a_plant_of_first_order_gets_the_poles_the_gains_were_placed_for(damping):
     gain_k, lag_s, natural, h = 30.0, 200.0, 0.02, 0.05
     gain_per_k = (2.0 * damping * natural * lag_s - 1.0) / gain_k

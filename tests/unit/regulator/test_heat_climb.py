@@ -82,6 +82,7 @@ def test_a_reading_that_stops_in_the_first_warm_up_ends_the_heat(lag_s, after_s,
 
 @pytest.mark.parametrize("after_s", [8, 20, 30])
 @pytest.mark.parametrize("lag_s", [15.0, 30.0])
+@pytest.mark.slow
 def test_a_reading_that_stops_before_there_is_a_climb_gets_four_minutes_of_heat(lag_s, after_s):
     plant = Plant(gain=0.11, loss=0.0, lag_s=lag_s).run(after_s, 1.0)
     stopped_c = plant.water_c

@@ -113,6 +113,7 @@ def test_a_sensor_that_hangs_in_the_air_latches_on_either_side(held_c):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.slow
 def test_a_reading_that_stops_is_missed_though_noise_is_more_than_the_cooler_does_in_a_block(seed):
     tank = Tank(seed, noise_k=0.06).hold(30.0, 900).hold(15.0, 4800)
     assert tank.supervisor.state is State.RUN

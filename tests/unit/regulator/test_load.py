@@ -48,6 +48,7 @@ SOON_NOTICED = pytest.mark.xfail(
     "controller",
     [pytest.param("adaptive", marks=SOON_NOTICED), {"kind": "pid", "gain_per_k": 0.4}],
 )
+@pytest.mark.slow
 def test_the_dip_is_at_most_half_of_what_it_would_be(drive_with, controller):
     unannounced_k, announced_k = dips(drive_with, controller)
     assert 0.0 < announced_k < 0.5 * unannounced_k

@@ -43,6 +43,7 @@ def test_a_sensor_that_is_mostly_gone_is_safe_within_a_minute_or_two(warm, patte
 
 
 @pytest.mark.parametrize("share", [0.2, 0.3])
+@pytest.mark.slow
 def test_a_plant_warms_up_though_a_reading_in_four_is_missing_from_the_first_second(
     drive_with, share
 ):

@@ -123,6 +123,7 @@ def view_of(
     st.text(min_size=1, max_size=100),
     insights,
 )
+@pytest.mark.slow
 def test_every_row_fits_whatever_comes(
     run: list[Cycle],
     interval_s: float,
