@@ -37,7 +37,8 @@ class BankBelief(NamedTuple):
     block : ndarray, shape (4, 5, n) or None
         The filters; None before the first valid reading.
     gains : Gains or None
-        Those of the filters after a sample of rest; None after any other.
+        Those of the filters in the last rest; None before it, and where more than power has moved
+        since.
     outlook : Outlook or None
         What follows for control; None before the first valid reading.
     prior : Prior

@@ -3,7 +3,7 @@
 The covariance of a Kalman filter does not depend on what is read. In a plant at rest it has come to
 where a reading takes away what a period has added, and the gains are those of the sample before. To
 find them again costs more than all that is done with them. So once they have settled they are kept,
-as those of a steady filter are; whatever is more than rest has them reckoned at once.
+as those of a steady filter are; whatever is more than rest is met by a full sample.
 
 Implements section 9 of ``docs/theory.md``.
 """
