@@ -61,9 +61,9 @@ class Filter:
         noise = [(0.08 * b) ** 2, 0.003**2, (0.0008 * b * restless) ** 2, (2e-4 * b) ** 2]
         before = self.x[0]
         self.x = F @ self.x
-        self.grow(self.x[0] - before)
         if steady:
             return
+        self.grow(self.x[0] - before)
         self.knew = self.P
         self.P = F @ self.P @ F.T + self.h * np.diag(noise)
         if self.arrives(t_s):
@@ -93,8 +93,10 @@ class Filter:
             A = np.eye(4) - np.outer(K, [0, 1, 0, 0])
             self.P = A @ self.P @ A.T + R * np.outer(K, K)
             self.P = (self.P + self.P.T) / 2
-        self.x[3] = min(max(self.x[3], 2e-5), 60.0 / self.lag_s)
-        if limit_loss:
+        self.x[3] = max(self.x[3], 2e-5)
+        if not steady:
+            self.x[3] = min(self.x[3], 60.0 / self.lag_s)
+        if limit_loss and not steady:
             self.x[2] = min(max(self.x[2], (u_min - 0.5) * self.x[3]), 0.95 * self.x[3])
         return nu, S
 
@@ -147,6 +149,7 @@ class PlainBank:
             for each in self.filters:
                 each.begin(y)
         self.k += 1
+        self.unmoved = False  # gain and weights are what they were
         away = abs(u - self.told[0]) if self.k > 0 else 0.0
         self.steady = self.settled and self.kept < 14 and e == 0 and away < 0.15
         self.steady &= not any(each.arrives(self.k * self.h) for each in self.filters)
@@ -216,6 +219,7 @@ class PlainBank:
         best = max(each.ln_w for each in self.filters)
         for each in self.filters:
             each.ln_w = max(each.ln_w - best, -30.0)
+        self.unmoved = self.steady and tempered == 1.0
         from_s = self.learnt_from_s - 1e-6
         quiet = e == 0 and away < 0.15 and not self.disturbed and self.k * self.h >= from_s
         if self.k * self.h >= from_s and bound is not None:
@@ -266,7 +270,8 @@ class PlainBank:
         w = np.exp([each.ln_w for each in self.filters])
         rows = [each.coasting(self.powers, self.u_min, self.u_max) for each in self.filters]
         rows = np.array(rows)
-        *self.told, variance = w @ rows / w.sum()
+        *told, variance = w @ rows / w.sum()
+        self.told = [*told[:3], *self.told[3:5], told[5]] if self.unmoved else told
         u_ss, coasting, lag, beta, heater, surplus = self.told
         spread = math.sqrt(w @ (rows[:, 1] - coasting) ** 2 / w.sum())
         lag_sd = math.sqrt(w @ (rows[:, 2] - lag) ** 2 / w.sum())

@@ -225,7 +225,9 @@ class Bank:
         kept = ahead.gains is not None and met.gains is not None and weights is belief.weights
         before = belief.outlook if kept else None
         view = outlook(met.block, way, weights.share, self.hypotheses, self.constants, before)
-        if not math.isfinite(np.vdot(met.block, met.block) + view.coasting_c):
+        # Where P is kept the means tell of all that is new: none of their weights is 0.
+        whole = met.surprise_k if kept else np.vdot(met.block, met.block)
+        if not math.isfinite(whole + view.coasting_c):
             raise ArithmeticError(f"expected a finite belief after {y_c!r} degC")
         for array in (met.block, *way):
             array.setflags(write=False)
@@ -299,8 +301,7 @@ class Bank:
         if gate.jumped or drifting.found:
             block, drifting, gains = self._disturbed(belief, block, gate, nu, noise.believed)
         if gains is not None:
-            block = filters.followed(block, y_c, gains.K)
-            self._limit(block, sample)
+            block = filters.followed(block, y_c, gains.K, self.constants)
             return Met(
                 noise, gate, weights, drifting, 0.0, surprise_k, block, gains.older(kept=True)
             )

@@ -107,18 +107,19 @@ def outlook(
     coasting *= coasting
     variance = float(mean(coasting)) - coasting_c * coasting_c
     if before is None:
+        gain, heater_k = float(mean(beta)) / h, float(mean(hypotheses.element * beta))
         lag_s = float(mean(hypotheses.lag_s))
         gain_sd = math.sqrt(float(mean(block[BETA, BETA]))) / h
         lag_sd_s = math.sqrt(max(float(mean(hypotheses.lag_squared)) - lag_s * lag_s, 0.0))
         lag_harmonic_s = 1.0 / float(mean(hypotheses.lag_inverse))
     else:
-        _, _, lag_s, _, _, _, _, gain_sd, lag_sd_s, lag_harmonic_s = before
+        _, _, lag_s, gain, heater_k, _, _, gain_sd, lag_sd_s, lag_harmonic_s = before
     return Outlook(  # in the order of its fields: by their names it would take twice as long
         coasting_c,
         holding_power,
         lag_s,
-        float(mean(beta)) / h,
-        float(mean(hypotheses.element * beta)),
+        gain,
+        heater_k,
         float(mean(path.heat)) - holding_power,
         math.sqrt(max(variance, 0.0)),
         gain_sd,

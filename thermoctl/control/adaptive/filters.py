@@ -207,11 +207,13 @@ def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0
 
 
 def moved(block: Block, heat: Array, constants: PerPeriod) -> Block:
-    """Return the block one period later as `predicted` does, but with P as it is."""
+    """Return the block one period later as `predicted` does, but with P and the loss as they are.
+
+    At rest water moves by millikelvins: what loss that costs is far below what is corrected of it.
+    """
     after = block.copy()
     water, sensor, d, beta = after[T, X], after[Z, X], after[D, X], after[BETA, X]
-    warming = _carried(water, sensor, d, beta, heat, constants.step[X], constants.soon[X])
-    grown(after, warming, constants)
+    _carried(water, sensor, d, beta, heat, constants.step[X], constants.soon[X])
     return after
 
 
@@ -315,11 +317,16 @@ def corrected(
     return after, nu * nu, S
 
 
-def followed(block: Block, y_c: float, K: Array) -> Block:
-    """Return the block after reading `y_c`, the states corrected by the gains `K`."""
+def followed(block: Block, y_c: float, K: Array, constants: PerPeriod) -> Block:
+    """Return the block after reading `y_c`, the states corrected by the gains `K`.
+
+    Of all limits only the one below which a gain is none is kept: the next full sample has others.
+    """
     after = block.copy()
     x = after[:, X]
     x += K * (y_c - x[Z])
+    beta = x[BETA]
+    np.maximum(beta, constants.gain_min, out=beta)
     return after
 
 
