@@ -320,10 +320,10 @@ class Step:
 
     @property
     def plant(self) -> PlantBelief | None:
-        """What the controller in charge believes of its plant, if it has such words.
+        """What the controller in charge, or else the one in shadow, believes of its plant.
 
-        Reckoned when asked for, from a belief that is frozen: whoever asks pays, in any thread, and
-        the loop never does.
+        None where neither has words for it. Reckoned when asked for, from a belief that is frozen:
+        whoever asks pays, in any thread, and the loop never does.
         """
         return self.tell()
 

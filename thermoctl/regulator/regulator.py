@@ -384,7 +384,7 @@ class Regulator:
             self._feasibility.known,
             situation.setpoint_c,  # reference_c
             load,
-            self._steering.tell,
+            self._steering.tell(self._shadow.mind),
             origin(self._steering.mind),
             remembering((self._steering.mind, self._shadow.mind), self._watch),
         )

@@ -66,10 +66,13 @@ class Steering:
             holding_power = told.holding_power
         return Beliefs(told.gain, told.gain_sd, a, a_sd, holding_power, told.lag_s)
 
-    @property
-    def tell(self) -> Callable[[], PlantBelief | None]:
-        """A function that says what is believed of the plant now, whenever it is called."""
-        return partial(_plant, self.mind.knows, self.mind.belief)
+    def tell(self, beside: Mind | None) -> Callable[[], PlantBelief | None]:
+        """Return a function that says what is believed of the plant now, whenever it is called.
+
+        Where the one in charge has no words for it, the one `beside` it may have some.
+        """
+        mind = self.mind if beside is None or self.mind.knows is not None else beside
+        return partial(_plant, mind.knows, mind.belief)
 
     def ride_s(self, situation: Situation, beliefs: Beliefs, most_s: float) -> float:
         """Return how long the model may steer without a sensor: 0 until it is known."""

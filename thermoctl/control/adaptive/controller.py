@@ -164,6 +164,14 @@ class Adaptive:
         rival = self.bank.start(noise=bank.noise)
         return AdaptiveBelief(bank, memory=Memory(rival))
 
+    def under(self, belief: AdaptiveBelief, power: float) -> AdaptiveBelief:
+        """Return the `belief` before the first sample of a plant that has long had `power`."""
+        law, heat, rival = self.bank, self._heat(power), belief.memory.rival
+        if rival is not None:
+            rival = law.under(rival, heat)
+        memory = replace(belief.memory, rival=rival)
+        return belief._replace(bank=law.under(belief.bank, heat), memory=memory)
+
     def remember(self, belief: AdaptiveBelief) -> Mapping[str, Any] | None:
         """Return gain, loss, noise and weights; None until known, or on trial."""
         if belief.memory.rival is not None or belief.doubt.stands:
