@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermoctl.quantities import Array
-from thermoctl.studies.record import Record
+from thermoctl.studies.record import Record, RecordError
 from thermoctl.studies.scaled import Scaling
 from thermoctl.studies.wide import WideModel, fit_wide
 
@@ -32,7 +32,18 @@ LAGS = 3
 """Past outputs of the model that words are taken from."""
 
 REACH = 26
-"""Its past inputs, unless an order that was weighed looks farther back."""
+"""Its past inputs at first, unless an order that was weighed looks farther back."""
+
+FAR_LAGS, WIDENED = 4.0, 3
+"""Inputs that look back less far than so many lags miss the tail of the answer, and tell a shorter
+lag: the model is widened until they do not, so many times at most."""
+
+PER_PARAMETER = 12
+"""As long as it has so many samples for a parameter: with fewer, bounds grow by more than the tail
+is worth."""
+
+GAIN, LAG = 0, 2
+"""Places of the two among the values of a view."""
 
 _NEWTON_STEPS = 30
 _SLOWEST_POLE = 0.5
@@ -101,15 +112,10 @@ def plant_words(record: Record, setpoint_c: float, reach: int = REACH) -> PlantW
     RecordError
         If the temperature never changes, or too few samples have a past as long as that.
     """
-    scaling = Scaling.of(record)
-    wide = fit_wide(record, scaling.outputs(record), scaling.inputs(record), LAGS, reach)
-    view = _View(wide, scaling, record.period_s, setpoint_c)
-    values = view.of(wide.theta)
-    if values is None:
+    told = _told(record, setpoint_c, reach)
+    if told is None:
         return None
-    margins = _SIGMAS * view.deviations(values)
-    if not values[0] - margins[0] > 0.0:
-        return None
+    values, margins = told
     gain, loss, lag, holding, _, rest = (
         Bounded(value, value - margin, value + margin)
         for value, margin in zip(values.tolist(), margins.tolist(), strict=True)
@@ -118,6 +124,40 @@ def plant_words(record: Record, setpoint_c: float, reach: int = REACH) -> PlantW
     return PlantWords(
         gain, loss, lag, holding, _time_constant(rate, margin), rest if rate > margin else None
     )
+
+
+def _told(record: Record, setpoint_c: float, reach: int) -> tuple[Array, Array] | None:
+    """Return the values of a model that looks back far enough, and their margins.
+
+    One that looks farther back than the record lets it tell the gain is no better.
+    """
+    farthest = len(record.y) // PER_PARAMETER - LAGS - 1
+    told = _seen(record, setpoint_c, reach)
+    for _ in range(WIDENED):
+        if told is None:
+            break
+        wanted = min(math.ceil(FAR_LAGS * float(told[0][LAG]) / record.period_s), farthest)
+        if wanted <= reach:
+            break
+        reach = wanted
+        try:
+            wider = _seen(record, setpoint_c, reach)
+        except RecordError:  # it has too many gaps for that
+            break
+        told = told if wider is None else wider
+    return told
+
+
+def _seen(record: Record, setpoint_c: float, reach: int) -> tuple[Array, Array] | None:
+    """Return values and margins of the model of so many past inputs; None if it is no tank's."""
+    scaling = Scaling.of(record)
+    wide = fit_wide(record, scaling.outputs(record), scaling.inputs(record), LAGS, reach)
+    view = _View(wide, scaling, record.period_s, setpoint_c)
+    values = view.of(wide.theta)
+    if values is None:
+        return None
+    margins: Array = _SIGMAS * view.deviations(values)
+    return (values, margins) if values[GAIN] - margins[GAIN] > 0.0 else None
 
 
 def _time_constant(rate: float, margin: float) -> Bounded | None:

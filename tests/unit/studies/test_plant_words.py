@@ -46,6 +46,13 @@ def test_the_truth_lies_within_the_bounds(seed, period_s):
     assert holds(words.loss_k_per_min, true_loss)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_lag_that_reaches_beyond_the_first_inputs_is_told_as_long_as_it_is(seed):
+    dead, lag_s = 3, 16.0
+    words = plant_words(tank(dead=dead, lag_s=lag_s, seed=seed), 37.5)
+    assert holds(words.lag_s, dead + 1.0 / (1.0 - math.exp(-1.0 / lag_s)) - 1.0, reach=1.0)
+
+
 def test_bounds_are_narrow_enough_to_be_of_use():
     words = plant_words(tank(), 37.5)
     for bounded, most in (
