@@ -320,7 +320,7 @@ class Step:
 
     @property
     def plant(self) -> PlantBelief | None:
-        """What the controller in charge, or else the one in shadow, believes of its plant.
+        """What the controller in charge, or else the one in shadow, believes of it.
 
         None where neither has words for it. Reckoned when asked for, from a belief that is frozen:
         whoever asks pays, in any thread, and the loop never does.

@@ -67,7 +67,7 @@ class Steering:
         return Beliefs(told.gain, told.gain_sd, a, a_sd, holding_power, told.lag_s)
 
     def tell(self, beside: Mind | None) -> Callable[[], PlantBelief | None]:
-        """Return a function that says what is believed of the plant now, whenever it is called.
+        """Return a function that says what is believed of the plant now, when called.
 
         Where the one in charge has no words for it, the one `beside` it may have some.
         """

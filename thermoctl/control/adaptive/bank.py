@@ -122,7 +122,7 @@ class Bank:
         return begun._replace(twin=Twin(heated, 0.0, True, begun.weights, begun.weights))
 
     def under(self, belief: BankBelief, power: float) -> BankBelief:
-        """Return the `belief` before the first sample of a plant that has long had `power`."""
+        """Return the `belief` to begin with of a plant that has long had `power`."""
         power = clamp(power, self.u_min, self.u_max)
         way = path.at_rest(self.hypotheses, power)
         return belief._replace(excitation=Excitation(power), path=way, twin=None)

@@ -165,7 +165,7 @@ class Adaptive:
         return AdaptiveBelief(bank, memory=Memory(rival))
 
     def under(self, belief: AdaptiveBelief, power: float) -> AdaptiveBelief:
-        """Return the `belief` before the first sample of a plant that has long had `power`."""
+        """Return the `belief` to begin with of a plant that has long had `power`."""
         law, heat, rival = self.bank, self._heat(power), belief.memory.rival
         if rival is not None:
             rival = law.under(rival, heat)

@@ -207,7 +207,7 @@ def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0
 
 
 def moved(block: Block, heat: Array, constants: PerPeriod) -> Block:
-    """Return the block one period later as `predicted` does, but with P and the loss as they are.
+    """Return the block one period later, with P and the loss as they are.
 
     At rest water moves by millikelvins: what loss that costs is far below what is corrected of it.
     """
