@@ -28,11 +28,6 @@ class CoolingCoil:
         self._parameters = parameters
         self._flow_w = 0.0
 
-    @property
-    def exists(self) -> bool:
-        """Whether there is a cooler at all."""
-        return self._parameters.rated_w > 0.0
-
     def advance(self, step_s: float, drive: float, water_c: float) -> float:
         """Return the mean heat in W that leaves the water during the next `step_s`.
 

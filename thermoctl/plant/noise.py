@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import chain
 
 from numpy.random import Generator
 
@@ -15,9 +16,13 @@ BLOCK = 512
 
 
 def normals(rng: Generator) -> Iterator[float]:
-    """Yield standard normal numbers for ever, drawn in blocks."""
+    """Return standard normal numbers without end, drawn in blocks."""
+    return chain.from_iterable(_blocks(rng))
+
+
+def _blocks(rng: Generator) -> Iterator[list[float]]:
     while True:
-        yield from rng.standard_normal(BLOCK)[::-1].tolist()
+        yield rng.standard_normal(BLOCK)[::-1].tolist()
 
 
 class Wander:
@@ -52,5 +57,5 @@ class Wander:
             self._interval_s = interval_s
             self._decay = math.exp(-interval_s / self._correlation_s)
             self._kick = self._deviation * math.sqrt(1.0 - self._decay**2)
-        self.value = self._decay * self.value + self._kick * next(self._normals)
-        return self.value
+        self.value = value = self._decay * self.value + self._kick * next(self._normals)
+        return value

@@ -74,7 +74,8 @@ class PowerStage:
     def mains(self) -> float:
         """Mains voltage as a fraction of the nominal one."""
         sag = self._sag if self._t_s < self._sag_until_s else 0.0
-        return max((1.0 + self._unrest.value) * (1.0 - sag), 0.0)
+        voltage = (1.0 + self._unrest.value) * (1.0 - sag)
+        return 0.0 if voltage < 0.0 else voltage
 
     def sag(self, depth: float, duration_s: float) -> None:
         """Lower the mains by the fraction `depth` for `duration_s`."""

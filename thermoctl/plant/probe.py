@@ -25,6 +25,9 @@ class Wiring(Enum):
     SHORT = "short"
 
 
+_UNSOUND_V = {Wiring.MISSING: math.nan, Wiring.OPEN: math.inf, Wiring.SHORT: 0.0}
+
+
 class ProbeInTank:
     """An LM335 in a sheath, downstream of the heater.
 
@@ -127,13 +130,7 @@ class ProbeInTank:
         A pending spike is used up.
         """
         spike_k, self._spike_k = self._spike_k, 0.0
-        match self.wiring:
-            case Wiring.SOUND:
-                sound_v = LM335.volts(self._sheath_c + spike_k + self._drift_k)
-                return sound_v * (1.0 + self._parameters.gain_error)
-            case Wiring.MISSING:
-                return math.nan
-            case Wiring.OPEN:
-                return math.inf
-            case Wiring.SHORT:
-                return 0.0
+        if self._t_s < self._wiring_until_s and self._wiring in _UNSOUND_V:
+            return _UNSOUND_V[self._wiring]
+        sound_v = LM335.volts(self._sheath_c + spike_k + self._drift_k)
+        return sound_v * (1.0 + self._parameters.gain_error)

@@ -49,7 +49,7 @@ class Tank:
         self._start = self._heat = thermal.start(parameters)
         self._t_s = 0.0
         self._heater_w = self._cooled_w = 0.0
-        self._coil = CoolingCoil(parameters.cooler)
+        self._coil = CoolingCoil(parameters.cooler) if parameters.cooler.rated_w > 0.0 else None
         self._stirred = True
         self._draught, self._draught_until_s = 1.0, 0.0
         self._k = thermal.conductances(parameters)
@@ -129,21 +129,22 @@ class Tank:
             self.draught(1.0, 0.0)
         self._heater_w = self.stage.advance(step_s, drive)
         unrest = 1.0 + self._loss.advance(step_s)
-        if self._coil.exists:
+        if self._coil is not None:
             self._cooled_w = self._coil.advance(step_s, cooling, self._water_c)
         self._heat = thermal.step(
             self._k, self._heat, self._heater_w, unrest, step_s, self._cooled_w
         )
         self._t_s += step_s
-        self.probe.advance(step_s, self._water_c, stirred=self._stirred)
+        water_c = self._water_c
+        self.probe.advance(step_s, water_c, stirred=self._stirred)
         if self.second is not None:
-            self.second.advance(step_s, self._water_c, stirred=self._stirred)
+            self.second.advance(step_s, water_c, stirred=self._stirred)
 
     @property
     def _water_c(self) -> float:
         """Temperature of the stirred zone."""
         heat = self._heat
-        zone_j_per_k = (1.0 - self._k.still_share) * heat.water_kg * WATER_J_PER_KG_K
+        zone_j_per_k = self._k.stirred_share * heat.water_kg * WATER_J_PER_KG_K
         return heat.water_j / zone_j_per_k
 
     def stir(self, on: bool) -> None:

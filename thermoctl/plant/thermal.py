@@ -51,10 +51,7 @@ class Heat(NamedTuple):
 
 _STORED = Heat._fields.index("electric_j")
 _HANDLED = Heat._fields.index("poured_j")  # from here on only people move anything
-_NOTHING = Heat(*(0.0 for _ in Heat._fields))
-
-Flows = tuple[tuple[float, ...], tuple[float, float], tuple[float, float, float, float]]
-"""What passes between entries: W within the glass, kg/s of vapour and ice, and what is outside."""
+_EMPTY = (0.0,) * _STORED
 
 
 class Temperatures(NamedTuple):
@@ -75,12 +72,15 @@ class Conductances:
     element_j_per_k: float
     wall_j_per_k: float
     still_share: float
+    stirred_share: float
     nominal_kg: float
     element_w_per_k: float
     exchange_w_per_k: float
     inner_w_per_k: float
     still_wall_share: float
+    stirred_wall_share: float
     base_share: float
+    side_share: float
     outer_w_per_k: float
     bath_room_w_per_k: float
     bath_melting_w_per_kg_k: float
@@ -111,16 +111,20 @@ def conductances(
     outside = vessel.bath_film_w_per_m2_k if parameters.bath.exists else vessel.room_film_w_per_m2_k
     half_glass = 0.5 * vessel.glass_m / vessel.glass_w_per_m_k  # the node sits in mid-glass
     convection = room.convection_w_per_m2_k * draught
+    base_share = vessel.surface_m2 / area
     return Conductances(
         element_j_per_k=element.capacity_j_per_k,
         wall_j_per_k=area * vessel.glass_m * vessel.glass_j_per_m3_k,
         still_share=vessel.still_share,
+        stirred_share=1.0 - vessel.still_share,
         nominal_kg=vessel.water_kg,
         element_w_per_k=element.to_water_w_per_k * (1.0 if stirred else element.still_factor),
         exchange_w_per_k=(vessel.exchange_w_per_k if stirred else vessel.still_exchange_w_per_k),
         inner_w_per_k=area / (1.0 / film + half_glass),
         still_wall_share=vessel.still_wall_share,
-        base_share=vessel.surface_m2 / area,
+        stirred_wall_share=1.0 - vessel.still_wall_share,
+        base_share=base_share,
+        side_share=1.0 - base_share,
         outer_w_per_k=area / (1.0 / outside + half_glass) if outside > 0.0 else 0.0,
         bath_room_w_per_k=parameters.bath.from_room_w_per_k,
         bath_melting_w_per_kg_k=parameters.bath.melting_w_per_kg_k,
@@ -158,26 +162,25 @@ def start(parameters: TankParameters) -> Heat:
 def temperatures(k: Conductances, heat: Heat) -> Temperatures:
     """Return the temperatures of the state."""
     zone = heat.water_kg * WATER_J_PER_KG_K
-    return Temperatures(
-        element_c=heat.element_j / k.element_j_per_k,
-        water_c=heat.water_j / (zone * (1.0 - k.still_share)),
-        still_c=heat.still_j / (zone * k.still_share),
-        wall_c=heat.wall_j / k.wall_j_per_k,
-        bath_c=heat.bath_j / (heat.bath_kg * WATER_J_PER_KG_K) if heat.bath_kg > 0.0 else math.nan,
-        bulk_c=(heat.water_j + heat.still_j) / zone,
-    )
+    element_c = heat.element_j / k.element_j_per_k
+    water_c = heat.water_j / (zone * k.stirred_share)
+    still_c = heat.still_j / (zone * k.still_share)
+    wall_c = heat.wall_j / k.wall_j_per_k
+    bath_c = heat.bath_j / (heat.bath_kg * WATER_J_PER_KG_K) if heat.bath_kg > 0.0 else math.nan
+    bulk_c = (heat.water_j + heat.still_j) / zone
+    return Temperatures(element_c, water_c, still_c, wall_c, bath_c, bulk_c)
 
 
 def evaporation_kg_per_s(k: Conductances, water_c: float, water_kg: float) -> float:
     """Return the vapour that leaves the surface; negative: it condenses."""
-    wet = (water_kg / k.nominal_kg - DRY_PART) / DRY_PART
-    if wet <= 0.0:
+    level = water_kg / k.nominal_kg
+    if level <= DRY_PART:
         return 0.0
     vapour = k.evaporation_kg_per_pa_s * (saturation_pa(water_c) - k.vapour_pa)
     if water_c > 100.0:
         excess_w = water_kg * WATER_J_PER_KG_K * (water_c - 100.0) / BOILING_S
         vapour += excess_w / vaporisation_j_per_kg(water_c)
-    return vapour if wet >= 1.0 else wet * vapour
+    return vapour if level >= 2.0 * DRY_PART else (level - DRY_PART) / DRY_PART * vapour
 
 
 def rates(
@@ -198,8 +201,8 @@ def rates(
     cooled_w : float
         Heat that a cooler takes out of the stirred water.
     """
-    flows = _flows(k, heat[:_STORED], unrest)
-    return Heat(*_moved(_NOTHING, 1.0, flows, heater_w, cooled_w))
+    stored, crossed = _rates(k, heat[:_STORED], heater_w, unrest, cooled_w)
+    return Heat(*_stored_after(_EMPTY, 1.0, stored), *crossed)
 
 
 def step(
@@ -211,30 +214,34 @@ def step(
     cooled_w: float = 0.0,
 ) -> Heat:
     """Return the state `step_s` later by the midpoint rule; at most `LONGEST_STEP_S`."""
-    now = _flows(k, heat[:_STORED], unrest)
-    middle = _moved(heat, 0.5 * step_s, now, heater_w, cooled_w)
-    mean = _flows(k, middle[:_STORED], unrest)
-    return Heat(*_moved(heat, step_s, mean, heater_w, cooled_w), *heat[_HANDLED:])
+    stored = heat[:_STORED]
+    now, _ = _rates(k, stored, heater_w, unrest, cooled_w)
+    middle = _stored_after(stored, 0.5 * step_s, now)
+    mean, crossing = _rates(k, middle, heater_w, unrest, cooled_w)
+    crossed = _crossed_after(heat[_STORED:_HANDLED], step_s, crossing)
+    return Heat._make(_stored_after(stored, step_s, mean) + crossed + heat[_HANDLED:])
 
 
-def _flows(k: Conductances, stored: Sequence[float], unrest: float) -> Flows:
-    """Return what passes between entries, in W and kg/s, as `_moved` takes it.
+def _rates(
+    k: Conductances, stored: Sequence[float], heater_w: float, unrest: float, cooled_w: float
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return by how much what is stored grows a second, and what crosses the boundary.
 
-    Bare numbers, here as there: a tank takes four of these a second, and with entries that are
-    looked up by name, or one after the other in a loop, a step would take half as long again.
+    Bare numbers, here as in what follows: a tank takes four of these a second, and with entries
+    that are taken one after the other in a loop, a step would take half as long again.
     """
     element_j, water_j, still_j, wall_j, bath_j, water_kg, ice_kg, bath_kg, bath_ice_kg = stored
     zone_j_per_k = water_kg * WATER_J_PER_KG_K
-    water_c = water_j / (zone_j_per_k * (1.0 - k.still_share))
+    water_c = water_j / (zone_j_per_k * k.stirred_share)
     still_c = still_j / (zone_j_per_k * k.still_share)
     wall_c = wall_j / k.wall_j_per_k
     heating_w = k.element_w_per_k * (element_j / k.element_j_per_k - water_c)
     level = water_kg / k.nominal_kg  # a stirrer turns over all there is in the same time
     mixing_w = level * k.exchange_w_per_k * (water_c - still_c)
     surface_w = k.surface_w_per_k * (water_c - k.room_c)
-    wetted = k.base_share + (1.0 - k.base_share) * level
+    wetted = k.base_share + k.side_share * level
     still_glass_w = wetted * k.still_wall_share * k.inner_w_per_k * (still_c - wall_c)
-    glass_w = wetted * (1.0 - k.still_wall_share) * k.inner_w_per_k * (water_c - wall_c)
+    glass_w = wetted * k.stirred_wall_share * k.inner_w_per_k * (water_c - wall_c)
     vapour_kg = evaporation_kg_per_s(k, water_c, water_kg)
     vapour_w = vapour_kg * (WATER_J_PER_KG_K * water_c + vaporisation_j_per_kg(water_c))
     melting_w = k.ice_melting_w_per_kg_k * ice_kg * water_c
@@ -243,9 +250,17 @@ def _flows(k: Conductances, stored: Sequence[float], unrest: float) -> Flows:
     # The zones keep their shares: what the one gains or loses flows on to or from the other.
     passed_c = water_c if gained_kg > 0.0 else still_c
     passed_w = k.still_share * gained_kg * WATER_J_PER_KG_K * passed_c
-    inside = (heating_w, mixing_w, glass_w, still_glass_w, surface_w, vapour_w, melting_w, passed_w)
-    outside = _outside(k, wall_c, unrest, bath_j, bath_kg, bath_ice_kg)
-    return inside, (vapour_kg, melted_kg), outside
+    wall_w, bath_w, room_w, thawed_kg = _outside(k, wall_c, unrest, bath_j, bath_kg, bath_ice_kg)
+    return (
+        heater_w - heating_w,
+        heating_w - mixing_w - glass_w - surface_w - vapour_w - melting_w - passed_w - cooled_w,
+        mixing_w - still_glass_w + passed_w,
+        glass_w + still_glass_w - wall_w,
+        bath_w,
+        gained_kg,
+        melted_kg,
+        thawed_kg,
+    ), (heater_w, surface_w + room_w, vapour_w, vapour_kg, cooled_w)
 
 
 def _outside(
@@ -267,30 +282,35 @@ def _outside(
     return wall_w, wall_w - room_w - melting_w, room_w, melting_w / FUSION_J_PER_KG
 
 
-def _moved(
-    heat: Heat, step_s: float, flows: Flows, heater_w: float, cooled_w: float
+def _stored_after(
+    stored: Sequence[float], step_s: float, rates: Sequence[float]
 ) -> tuple[float, ...]:
-    """Return `heat` after `flows` of `step_s`: what leaves one entry enters another."""
-    stored, crossed = heat[:_STORED], heat[_STORED:_HANDLED]
+    """Return what is stored after `rates` of `step_s`."""
     element_j, water_j, still_j, wall_j, bath_j, water_kg, ice_kg, bath_kg, bath_ice_kg = stored
-    electric_j, room_j, vapour_j, vapour_kg, cooled_j = crossed
-    inside, (evaporated_kg, melted_kg), (wall_w, bath_w, room_w, thawed_kg) = flows
-    heating_w, mixing_w, glass_w, still_glass_w, surface_w, vapour_w, melting_w, passed_w = inside
-    water_w = (
-        heating_w - mixing_w - glass_w - surface_w - vapour_w - melting_w - passed_w - cooled_w
-    )
+    element_w, water_w, still_w, wall_w, bath_w, gained_kg, melted_kg, thawed_kg = rates
+    thawn_kg = step_s * thawed_kg
     return (
-        element_j + step_s * (heater_w - heating_w),
+        element_j + step_s * element_w,
         water_j + step_s * water_w,
-        still_j + step_s * (mixing_w - still_glass_w + passed_w),
-        wall_j + step_s * (glass_w + still_glass_w - wall_w),
+        still_j + step_s * still_w,
+        wall_j + step_s * wall_w,
         bath_j + step_s * bath_w,
-        water_kg + step_s * (melted_kg - evaporated_kg),
+        water_kg + step_s * gained_kg,
         ice_kg - step_s * melted_kg,
-        bath_kg + step_s * thawed_kg,
-        bath_ice_kg - step_s * thawed_kg,
+        bath_kg + thawn_kg,
+        bath_ice_kg - thawn_kg,
+    )
+
+
+def _crossed_after(
+    crossed: Sequence[float], step_s: float, rates: Sequence[float]
+) -> tuple[float, ...]:
+    """Return what has crossed the boundary after `rates` of `step_s`."""
+    electric_j, room_j, vapour_j, vapour_kg, cooled_j = crossed
+    heater_w, room_w, vapour_w, evaporated_kg, cooled_w = rates
+    return (
         electric_j + step_s * heater_w,
-        room_j + step_s * (surface_w + room_w),
+        room_j + step_s * room_w,
         vapour_j + step_s * vapour_w,
         vapour_kg + step_s * evaporated_kg,
         cooled_j + step_s * cooled_w,
