@@ -46,6 +46,7 @@ class State(StrEnum):
     LATCHED = "latched"
 
 
+@quickly_filled
 @dataclass(frozen=True, slots=True)
 class RawSample:
     """One input as the converter saw it.
@@ -68,6 +69,7 @@ class RawSample:
     sequence: int | None = None
 
 
+@quickly_filled
 @dataclass(frozen=True, slots=True)
 class Measurement:
     """A temperature and what is known of it."""

@@ -11,9 +11,9 @@ import pytest
 
 from thermoctl.filling import quickly_filled
 from thermoctl.ports import Situation
-from thermoctl.signals import Beliefs, Step
+from thermoctl.signals import Beliefs, Measurement, RawSample, Step
 
-QUICK = [Beliefs, Situation, Step]
+QUICK = [Beliefs, Measurement, RawSample, Situation, Step]
 
 
 @dataclass(frozen=True, slots=True)
