@@ -22,11 +22,13 @@ def commanded(name: str, power: Any, valid_for_s: Any, longest_s: float) -> tupl
     FaultError
         `power` or `valid_for_s` is no such number; the caller gives power 0.
     """
-    for what, value in ((name, power), (f"validity of {name}", valid_for_s)):
-        if not (is_finite_number(value) or _is_nan(value)):
-            raise FaultError(f"{what}: expected a finite number, got {value!r}")
+    if not _is_number(power):
+        raise FaultError(f"{name}: expected a finite number, got {power!r}")
+    if not _is_number(valid_for_s):
+        raise FaultError(f"validity of {name}: expected a finite number, got {valid_for_s!r}")
     return clamp(power, 0.0, 1.0), clamp(valid_for_s, 0.0, longest_s)
 
 
-def _is_nan(value: Any) -> bool:
-    return isinstance(value, float | np.floating) and math.isnan(value)
+def _is_number(value: Any) -> bool:
+    """Return whether `value` is finite, or NaN."""
+    return is_finite_number(value) or (isinstance(value, float | np.floating) and math.isnan(value))

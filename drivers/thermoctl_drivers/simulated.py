@@ -145,6 +145,8 @@ class SimulatedBoard:
         self._acquisition = Acquisition(acquisition, input_rng)
         self._element = Acquisition(acquisition, element_rng) if settings.element_sensor else None
         self._second = Acquisition(acquisition, second_rng) if settings.second_sensor else None
+        inputs = (self._acquisition, self._element, self._second)
+        self._inputs = tuple(each for each in inputs if each is not None)
         self._full_scale = float(acquisition.full_scale)
         self._drive_steps = 2**settings.dac_bits - 1
         self._is_open = False
@@ -295,8 +297,8 @@ class SimulatedBoard:
         if not self._is_open:
             raise LinkError("board must be opened first, it is closed")
         now_s = self._clock.now_s()
-        interval_s = max(now_s - self._now_s, 0.0)
-        if interval_s == 0.0:
+        interval_s = now_s - self._now_s
+        if interval_s <= 0.0:
             return
         driven_s = clamp(self._armed_until_s - self._now_s, 0.0, interval_s)
         self._tank.advance(driven_s, self._drives[OUTPUT], self._drives.get(COOLER, 0.0))
@@ -304,9 +306,8 @@ class SimulatedBoard:
             self._counters["dead_man"] += any(self._drives.values())
             self._switch_off()
             self._tank.advance(interval_s - driven_s, 0.0)
-        for each in (self._acquisition, self._element, self._second):
-            if each is not None:
-                each.advance(interval_s)
+        for each in self._inputs:
+            each.advance(interval_s)
         self._now_s = now_s
 
 

@@ -73,6 +73,7 @@ class Loop:
         }
         self._clock, self._period_s = clock, period_s
         self._lasts_s = command_lasts_s(period_s)
+        self._fresh_s = max(FRESH_S, 1.5 * period_s)
         self._publish, self._completed = publish, completed
         self._requests: queue.SimpleQueue[Asked] = queue.SimpleQueue()
         self._claimed: list[Asked] = []
@@ -155,7 +156,8 @@ class Loop:
     # -- the walk of a sample --------------------------------------------------------------------
 
     def _walk(self, deadline_s: float) -> None:
-        late_s = max(0.0, self._clock.now_s() - deadline_s)
+        now_s = self._clock.now_s()
+        late_s = now_s - deadline_s if now_s > deadline_s else 0.0
         if late_s > SUSPENDED_S:
             self._all_off()
             self.report("cycle.late", late_s=late_s)
@@ -165,13 +167,13 @@ class Loop:
             return  # no reading is missing yet, and no output is on
         seen = {w.name: self._see(w, samples) for w in self.wirings}
         led = self._cascade.tell(seen)
-        walked = []
+        walked, steps = [], {}
         for wiring in self.wirings:
             begin_ns = time.thread_time_ns()
-            step = wiring.regulator.step(seen[wiring.name])
+            steps[wiring.name] = step = wiring.regulator.step(seen[wiring.name])
             walked.append((wiring, step, (time.thread_time_ns() - begin_ns) / 1000.0))
             hand_down(wiring, step.command.power, self._named)
-        accepted = self._write({wiring.name: step for wiring, step, _ in walked}) | led
+        accepted = self._write(steps) | led
         self._cascade.gave = accepted
         events = self.take_events()
         for wiring, step, tick_us in walked:
@@ -184,7 +186,8 @@ class Loop:
         All loops wait for it: one that follows another must not begin before its master.
         """
         now_s = self._clock.now_s()
-        self._begun_s = min(self._begun_s, now_s)
+        if now_s < self._begun_s:
+            self._begun_s = now_s
         return now_s - self._begun_s < AWAITED_S and any(each.awaited for each in self.boards)
 
     def _read(self, board: Connection) -> Mapping[str, RawSample]:
@@ -221,7 +224,7 @@ class Loop:
         now_s = self._clock.now_s()
         try:
             measurement = read.sensor.measure(samples.get(read.channel), now_s)
-            if -EXCHANGE_S <= now_s - measurement.t_s <= max(FRESH_S, 1.5 * self._period_s):
+            if -EXCHANGE_S <= now_s - measurement.t_s <= self._fresh_s:
                 return measurement
         except Exception as error:  # noqa: BLE001 - of a sample that a plug-in made
             self._fail((wiring,), "cycle.failed", error)
@@ -239,10 +242,12 @@ class Loop:
             if not wired or board.board is None:
                 continue
             now_s = self._clock.now_s()
-            drives = {o.channel: self._drive(w, o, steps[w.name].command.power) for w, o in wired}
-            lasts_s = self._lasts_s  # at most, whatever the time of a sample says
-            for w, _ in wired:
-                lasts_s = min(lasts_s, steps[w.name].command.valid_until_s - now_s)
+            drives, lasts_s = {}, self._lasts_s  # at most, whatever the time of a sample says
+            for w, o in wired:
+                command = steps[w.name].command
+                drives[o.channel] = self._drive(w, o, command.power)
+                left_s = command.valid_until_s - now_s
+                lasts_s = left_s if left_s < lasts_s else lasts_s
             try:
                 answer = board.write(drives, lasts_s, now_s + EXCHANGE_S)
                 powers = {o: o.power(answer.get(o.channel)) for _, o in wired}

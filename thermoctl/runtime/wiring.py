@@ -103,7 +103,8 @@ class Wiring:
 
     def share(self, output: Output, power: float) -> float:
         """Return the part of the signed `power` that `output` gives; never both give one."""
-        return max(-power if output is self.cooler else power, 0.0)
+        part = -power if output is self.cooler else power
+        return 0.0 if part < 0.0 else part
 
 
 def signed(shares: Sequence[float]) -> float:
