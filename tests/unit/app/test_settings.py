@@ -84,6 +84,19 @@ def test_there_are_profiles():
     assert {path.stem for path in PROFILES} >= {"aquarium", "ozbek2021", "thermodaq"}
 
 
+@pytest.mark.parametrize("kind", ["ckf", "nkf"])
+def test_a_table_that_only_names_a_filter_has_the_noises_of_no_table_at_all(minimal, kind):
+    without = load(minimal).loops["tank"].estimator
+    minimal["loops"]["tank"]["estimator"] = {"kind": kind}
+    named = load(minimal).loops["tank"].estimator
+    assert named.options == without.options == {"R1": 1e-8, "R2": 0.1}
+
+
+def test_a_noise_that_is_written_stands(minimal):
+    minimal["loops"]["tank"]["estimator"] = {"kind": "ckf", "R1": 0.0}
+    assert load(minimal).loops["tank"].estimator.options == {"R1": 0.0, "R2": 0.1}
+
+
 def test_what_is_in_force_loads_as_the_same_settings(minimal):
     minimal["loops"]["tank"]["estimator"] = {"kind": "ckf", "inflation_max": math.inf}
     loaded = load(minimal)

@@ -10,6 +10,7 @@ import click
 from thermoctl.app.commands.options import Commands, config_option, json_option
 from thermoctl.app.compose import wiring_errors
 from thermoctl.app.configuration.document import BadConfiguration, exposures, read_document
+from thermoctl.app.configuration.in_force import in_force
 from thermoctl.app.configuration.new import new
 from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.configuration.toml_text import toml_text
@@ -66,7 +67,8 @@ def runnable(files: list[Path]) -> Settings:
 def show(configs: tuple[Path, ...], as_json: bool) -> None:
     """Print the configuration in force, defaults included, as TOML."""
     settings = load_all(list(configs) or default_files())
-    click.echo(settings.as_json() if as_json else toml_text(settings.in_force()), nl=as_json)
+    content = in_force(settings)
+    click.echo(json.dumps(content, sort_keys=True) if as_json else toml_text(content), nl=as_json)
 
 
 @config.command()

@@ -16,7 +16,7 @@ from typing import Any, get_args, get_type_hints
 from pydantic import BaseModel, TypeAdapter
 
 from thermoctl.app import plugins
-from thermoctl.app.configuration.tables import EstimatorTable, LoopTable
+from thermoctl.app.configuration.tables import NOISES, EstimatorTable, LoopTable
 from thermoctl.app.configuration.toml_text import toml_value
 from thermoctl.app.configuration.units import unit_of
 from thermoctl.app.settings import Settings
@@ -92,7 +92,17 @@ def option_schemas(law: type) -> dict[str, dict[str, Any]]:
         schemas[field.name]["description"] = texts.get(field.name, "")
         if field.default is not dataclasses.MISSING:
             schemas[field.name]["default"] = field.default
+    for name, default in _defaults_in_a_loop(law).items():
+        schemas[name]["default"] = default
     return schemas
+
+
+def _defaults_in_a_loop(law: type) -> Mapping[str, Any]:
+    """Return the defaults that a configuration has in place of the law's own."""
+    for kind, defaults in NOISES.items():
+        if plugins.find(plugins.ESTIMATORS, kind) is law:
+            return defaults
+    return {}
 
 
 def _table_schema(group: Any) -> dict[str, Any]:

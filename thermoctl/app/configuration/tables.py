@@ -157,6 +157,10 @@ class GuardsTable(Table):
     )
 
 
+NOISES = {kind: {"R1": 1e-8, "R2": 0.1} for kind in ("ckf", "nkf")}
+"""What a loop's filter has where nothing is said: a loss that drifts, noise for a missing lag."""
+
+
 class EstimatorTable(Options):
     """Table ``[loops.NAME.estimator]``: the law that learns the model."""
 
@@ -169,6 +173,11 @@ class EstimatorTable(Options):
         description="Parameters at the start; if absent no loss and the model's gain.",
     )
     guards: GuardsTable = Field(default_factory=GuardsTable)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Every key of the law, the noises of a loop included."""
+        return {**NOISES.get(self.kind, {}), **super().options}
 
 
 class ModelTable(Table):
@@ -304,12 +313,7 @@ class LoopTable(Table):
         "can be put in charge while the loop runs.",
     )
     model: ModelTable = Field(default_factory=ModelTable)
-    estimator: EstimatorTable = Field(
-        default_factory=lambda: EstimatorTable.model_validate(
-            {"kind": "ckf", "R1": 1e-8, "R2": 0.1}
-        )
-    )
-
+    estimator: EstimatorTable = Field(default_factory=EstimatorTable)
     orders: OrdersTable | None = Field(
         None, description="Table of the orders that are weighed beside the loop; none when absent."
     )

@@ -15,7 +15,11 @@ from hypothesis import strategies as st
 
 from thermoctl.app.cli import cli, main
 from thermoctl.app.compose import wiring_errors
+from thermoctl.app.configuration.catalogue import INJECTED
+from thermoctl.app.configuration.in_force import in_force
 from thermoctl.app.configuration.toml_text import toml_text
+from thermoctl.app.parts import plan_for
+from thermoctl.app.plugins import CONTROLLERS, ESTIMATORS, find, option_names
 from thermoctl.app.settings import load
 
 PROFILES = sorted((Path(__file__).parents[4] / "config").glob("*.toml"))
@@ -142,12 +146,12 @@ def test_a_file_that_its_group_may_write_to_passes_with_a_warning(run, file):
 def test_what_is_shown_loads_as_the_same_settings(run, path):
     code, out, err = run("config", "show", "-c", path)
     assert (code, err) == (0, "")
-    assert load(tomllib.loads(out)) == load(path)
+    assert in_force(load(tomllib.loads(out))) == in_force(load(path))
 
 
 def test_what_is_shown_as_json_loads_as_the_same_settings(run, file):
     _, out, _ = run("config", "show", "-c", file, "--json")
-    assert load(json.loads(out)) == load(file)
+    assert in_force(load(json.loads(out))) == in_force(load(file))
 
 
 def test_what_is_shown_holds_defaults(run, file):
@@ -155,6 +159,29 @@ def test_what_is_shown_holds_defaults(run, file):
     shown = tomllib.loads(out)
     assert "period_s" not in file.read_text()
     assert shown["loops"]["tank"]["period_s"] == 1.0
+
+
+@pytest.mark.parametrize("path", PROFILES, ids=lambda path: path.stem)
+def test_what_is_shown_has_every_option_and_makes_the_same_regulator(run, path):
+    _, out, _ = run("config", "show", "-c", path)
+    shown = tomllib.loads(out)
+    for name, table in load(path).loops.items():
+        for key, group in (("controller", CONTROLLERS), ("estimator", ESTIMATORS)):
+            law = find(group, getattr(table, key).kind)
+            assert set(option_names(law, INJECTED)) <= set(shown["loops"][name][key])
+        again, plan = plan_for(load(shown).loops[name]), plan_for(table)
+        assert (again.controller, again.limits) == (plan.controller, plan.limits)
+        assert (again.shadow, again.identifier.P0) == (plan.shadow, plan.identifier.P0)
+
+
+def test_constants_that_nobody_has_written_are_shown_in_their_tables(run, tmp_path, minimal):
+    path = tmp_path / "least.toml"
+    path.write_text(toml_text(minimal))
+    _, out, _ = run("config", "show", "-c", path)
+    tank = tomllib.loads(out)["loops"]["tank"]
+    assert tank["controller"]["calmness"] == 0.35
+    assert tank["controller"]["lags"]["count"] == 24
+    assert (tank["estimator"]["R1"], tank["estimator"]["R2"]) == (1e-8, 0.1)
 
 
 @given(TREES)
