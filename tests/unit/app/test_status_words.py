@@ -59,3 +59,10 @@ def test_an_arrival_and_a_load_have_lines_only_while_there_are_any(record):
     assert (told["Arrives"], told["Load told"]) == ("in 12 min ± 2 min", "20.0 %")
     quiet = rows(record | {"feasible": feasible | {"arrival_s": None}, "load": 0.0})
     assert not {"Arrives", "Load told"} & set(quiet)
+
+
+def test_a_deviation_is_that_from_the_ramp_while_there_is_one_as_in_the_view(record):
+    way = {"temperature_c": 36.76, "setpoint_c": 40.0, "reference_c": 36.743}
+    assert rows(record | way)["Deviation"] == "+17 mK from the ramp"
+    assert rows(record | way | {"mode": "off"})["Deviation"] == "−3.24 K from the set point"
+    assert rows(record | way | {"temperature_c": None})["Deviation"] == "–"

@@ -21,6 +21,7 @@ from thermoctl.app.commands.options import (
 )
 from thermoctl.app.commands.service import settings_of, state_of_daemon
 from thermoctl.app.cycle_record import latch_row
+from thermoctl.app.live import numbers
 from thermoctl.app.settings import ETC, Settings
 from thermoctl.errors import NotPermitted, NotRunning, Refused, Unavailable
 from thermoctl.services.control_client import ControlClient
@@ -75,7 +76,8 @@ def _described(row: Mapping[str, Any]) -> list[str]:
     over = "" if row["active"] else " (over, not acknowledged)"
     since = row["since"] or "unknown"
     advice = advice_for(row["code"])
-    told = f"{row['loop']} : {row['code']} since {since}: {row['text']}{over}"
+    text = numbers.plain(numbers.sentence(row["text"]))
+    told = f"{row['loop']} : {row['code']} since {since}: {text}{over}"
     return [told, f"    {advice}"] if advice else [told]
 
 

@@ -156,7 +156,7 @@ def set_command(
     """Hold another temperature, in °C; at once, unless a rate limits it."""
     told = _asked(socket, "set", loop=loop, value_c=value_c, rate_k_per_min=ramp)
     at = "" if ramp is None else f", at {ramp:.3g} K/min"
-    words = f"set point {_plain(numbers.temperature(told['setpoint_c']))}{at}"
+    words = f"set point {numbers.plain(numbers.temperature(told['setpoint_c']))}{at}"
     _tell(told, as_json, lambda: words)
 
 
@@ -185,7 +185,7 @@ def mode(mode: str, loop: str | None, socket: Path | None, as_json: bool) -> Non
 def output(power: float, loop: str | None, socket: Path | None, as_json: bool) -> None:
     """Give this power while the mode is manual; below 0 it is a cooler's."""
     told = _asked(socket, "output", loop=loop, power=power)
-    _tell(told, as_json, lambda: f"power {_plain(numbers.power(told['power']))}")
+    _tell(told, as_json, lambda: f"power {numbers.plain(numbers.power(told['power']))}")
 
 
 @click.command(
@@ -210,7 +210,7 @@ def load(
     duration_s = duration_s or _OVER_S
     told = _asked(socket, "load", loop=loop, power=power, duration_s=duration_s)
     lasting = f" for {told['duration_s']:g} s" if power else ""
-    _tell(told, as_json, lambda: f"load {_plain(numbers.power(told['power']))}{lasting}")
+    _tell(told, as_json, lambda: f"load {numbers.plain(numbers.power(told['power']))}{lasting}")
 
 
 @click.command(epilog=examples("thermoctl controller self-tuning-mv"))
@@ -293,22 +293,15 @@ def _tell(told: Mapping[str, Any], as_json: bool, words: Callable[[], str]) -> N
 # -- words -----------------------------------------------------------------------------------------
 
 
-def _plain(text: str) -> str:
-    """Return `text` with the spaces that a search finds."""
-    return text.replace(numbers.NBSP, " ")
-
-
 def _described(record: Mapping[str, Any]) -> str:
     """Return the status of one loop, a line a value, the colons below each other."""
-    missing = record["temperature_c"] is None
-    deviation_k = None if missing else record["temperature_c"] - record["setpoint_c"]
     rows: dict[str, Any] = {
         "Loop": record["loop"],
         "Temperature": numbers.temperature(record["temperature_c"]),
         "Reading": record["quality"],
         "Set point": numbers.temperature(record["setpoint_c"]) + _on_the_way(record),
         **_foretold(record),
-        "Deviation": numbers.difference(deviation_k),
+        "Deviation": _deviation(record),
         "Power": numbers.power(record["power"]),
         "Power taken": numbers.power(record["accepted_power"]),
         "Mode": record["mode"],
@@ -321,15 +314,31 @@ def _described(record: Mapping[str, Any]) -> str:
     }
     lines = [*rows.items(), *insight_lines(record.get("insight"))]
     width = max(len(name) for name, _ in lines)
-    return _plain("\n".join(f"{name:<{width}} : {value}" for name, value in lines))
+    return numbers.plain("\n".join(f"{name:<{width}} : {value}" for name, value in lines))
+
+
+def _ramp_c(record: Mapping[str, Any]) -> float | None:
+    """Return where the ramp to the set point is; None without one."""
+    told: float | None = record["reference_c"]
+    if record["mode"] != "auto" or told is None or abs(told - record["setpoint_c"]) < _SAME_K:
+        return None
+    return told
 
 
 def _on_the_way(record: Mapping[str, Any]) -> str:
-    """Return where the ramp to the set point is; empty without one."""
-    told = record["reference_c"]
-    if record["mode"] != "auto" or told is None or abs(told - record["setpoint_c"]) < _SAME_K:
-        return ""
-    return f", ramp at {numbers.temperature(told)}"
+    """Return where the ramp to the set point is, in words; empty without one."""
+    ramp_c = _ramp_c(record)
+    return "" if ramp_c is None else f", ramp at {numbers.temperature(ramp_c)}"
+
+
+def _deviation(record: Mapping[str, Any]) -> str:
+    """Return the distance from what is followed, the ramp while there is one, and which it is."""
+    ramp_c, told = _ramp_c(record), record["temperature_c"]
+    if told is None:
+        return numbers.UNKNOWN
+    if ramp_c is None:
+        return f"{numbers.difference(told - record['setpoint_c'])} from the set point"
+    return f"{numbers.difference(told - ramp_c)} from the ramp"
 
 
 def _foretold(record: Mapping[str, Any]) -> dict[str, str]:
@@ -360,7 +369,7 @@ def _shadow(record: Mapping[str, Any]) -> dict[str, str]:
 def _line(record: Mapping[str, Any]) -> str:
     """Return a finished cycle as one line."""
     alarms = f"  {' '.join(record['alarms'])}" if record["alarms"] else ""
-    return _plain(
+    return numbers.plain(
         f"{datetime.now():%H:%M:%S}  {record['loop']}  "
         f"{numbers.temperature(record['temperature_c']):>9}  "
         f"set {numbers.temperature(record['setpoint_c']):>9}{_on_the_way(record)}  "

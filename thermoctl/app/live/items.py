@@ -240,8 +240,8 @@ def _item(bench: Bench, row: Row, label: str, decimals: int, course: int | None)
     low, high = numbers.number(row.low, decimals), numbers.number(row.high, decimals)
     ranged = numbers.UNKNOWN not in (low, high)
     error = f"({low} to {high})" if ranged else _error(row.error, decimals)
-    if len(error) > _ERROR_CELLS:
-        error = error.strip("()")
+    if len(error) > _ERROR_CELLS and ranged:
+        error = f"({low}–{high})"  # without brackets the row would read as three numbers
     spark = ""
     if course is not None:
         ranges = (row.high or 0.0) - (row.low or 0.0) if ranged else 2.0 * (row.error or 0.0)

@@ -10,7 +10,7 @@ from datetime import datetime
 import numpy as np
 
 from thermoctl.app.live.scale import Scale, range_for
-from thermoctl.app.live.sentences import Sentence, sentence
+from thermoctl.app.live.sentences import Sentence, continued, sentence
 from thermoctl.app.live.trend import Trend, TrendRecorder
 from thermoctl.insight import Change, Drift, Insight, Row
 from thermoctl.quantities import Array
@@ -335,8 +335,15 @@ class LiveModel:
         self._drifts = now
 
     def note(self, event: Event) -> None:
-        """Take an event that came by another way than a step."""
-        self._events.append(sentence(event))
+        """Take an event, also one that came by another way than a step.
+
+        A change that goes on with the last one takes its place, or a key that is held down would
+        push all else off the screen.
+        """
+        if self._events and (whole := continued(self._events[-1], event)) is not None:
+            self._events[-1] = whole
+        else:
+            self._events.append(sentence(event))
 
     def view(self, now_s: float, prompt: str = "", *, paused: bool = False, lost: str = "") -> View:
         """Return what to show at loop time `now_s`, `prompt` in the row of keys."""

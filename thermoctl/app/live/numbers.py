@@ -94,9 +94,14 @@ def wall_time(zero: datetime, t_s: float, pattern: str = "%H:%M:%S") -> str:
         return UNKNOWN
 
 
+def plain(text: str) -> str:
+    """Return `text` with the spaces that a search finds."""
+    return text.replace(NBSP, " ")
+
+
 def sentence(words: str) -> str:
-    """Return `words` of a log, which write degC, with the sign that the screen uses."""
-    return re.sub(r"\s*\bdegC\b", f"{NBSP}°C", words)
+    """Return `words` of a log, its degC and +- as the signs that the screen uses."""
+    return re.sub(r"\s*\+-\s*", " ± ", re.sub(r"\s*\bdegC\b", f"{NBSP}°C", words))
 
 
 _BY_SUFFIX: tuple[tuple[str, Callable[[float], str]], ...] = (

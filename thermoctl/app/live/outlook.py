@@ -8,7 +8,7 @@ from thermoctl.app.live import numbers
 from thermoctl.app.live.look import Role
 from thermoctl.app.live.model import View, to_hold
 from thermoctl.app.live.rows import Part
-from thermoctl.signals import Mode
+from thermoctl.signals import Mode, Step
 
 UNREACHABLE = "setpoint.unreachable"
 _VAGUE = 0.1
@@ -21,11 +21,7 @@ def outlook(view: View) -> list[list[Part]]:
     if step is None or step.mode is Mode.OFF:
         return []
     if any(alarm.code == UNREACHABLE and alarm.active for alarm in step.alarms):
-        most = numbers.plus_minus(step.feasible.highest_c, 2.0 * step.feasible.highest_sd_k, 1)
-        if numbers.UNKNOWN in most:
-            return [[(" · out of reach", Role.AMBER)]]
-        words = f" · out of reach: at most {numbers.with_unit(most, '°C')}"
-        return [[(words, Role.AMBER)], [(" · out of reach", Role.AMBER)]]
+        return [[(f" · {words}", Role.AMBER)] for words in _out_of_reach(step)]
     power, sd = to_hold(step, view.insight)
     percent = numbers.plus_minus(100.0 * power, 200.0 * sd, 0)
     vague = numbers.UNKNOWN in percent or 2.0 * sd > _VAGUE
@@ -35,6 +31,18 @@ def outlook(view: View) -> list[list[Part]]:
         return [[(" · holds with ", Role.MUTE), *held]] if held else []
     arrives: list[Part] = [(" · arrives ", Role.MUTE), (when, Role.BLUE)]
     return [[(" · needs ", Role.MUTE), *held, *arrives], arrives] if held else [arrives]
+
+
+def _out_of_reach(step: Step) -> list[str]:
+    """Return ways to say what can be held instead; in little room only that, without its error."""
+    highest_c, sd_k = step.feasible.highest_c, step.feasible.highest_sd_k
+    most = numbers.plus_minus(highest_c, 2.0 * sd_k, 1)
+    if numbers.UNKNOWN in most:
+        return ["out of reach"]
+    side = "least" if step.setpoint_c < step.measurement.temperature_c else "most"
+    told = f"at {side} {numbers.with_unit(most, '°C')}"
+    short = f"at {side} {numbers.with_unit(numbers.number(highest_c, 1), '°C')}"
+    return [f"out of reach: {told}", told, short, "out of reach"]
 
 
 def _arrival(view: View) -> str:

@@ -67,7 +67,8 @@ def _events(view: View, look: Look, rows: int, width: int) -> list[Text]:
     newest = view.events[::-1][:rows]
     shown = [_event_row(view, look, event, width) for event in newest]
     if not shown:
-        shown = [fitted(look.text(("nothing has happened yet", Role.MUTE)), width)]
+        since = "yet" if view.facts.simulated else "since this view was opened"
+        shown = [fitted(look.text((f"nothing has happened {since}", Role.MUTE)), width)]
     return shown + [fitted(look.text(), width) for _ in range(rows - len(shown))]
 
 

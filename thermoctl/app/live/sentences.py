@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from thermoctl.app.live.numbers import quantity
@@ -21,12 +21,14 @@ class Mark(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Sentence:
-    """An event as it is shown."""
+    """An event as it is shown; or several `steps` of one change, the oldest `first`."""
 
     t_s: float
     name: str
     text: str
     mark: Mark
+    first: Event | None = None
+    steps: int = 1
 
 
 # Richest template first; the first one whose fields are all there is used. Units come with the
@@ -125,6 +127,13 @@ _STATE_MARKS = {
 }
 
 
+STEPWISE = frozenset({"setpoint.changed", "output.changed"})
+"""What is changed in steps, by a key that is held down for instance."""
+
+TOGETHER_S = 30.0
+"""Steps that are no farther apart are one change."""
+
+_BEFORE = "before"
 _PLAIN_WORDS = frozenset({"text", "why", "error"})
 
 
@@ -150,7 +159,21 @@ def sentence(event: Event) -> Sentence:
     for template in templates:
         try:
             words = template.format_map(fields)
-            return Sentence(event.t_s, event.name, words[:1].upper() + words[1:], mark)
+            return Sentence(event.t_s, event.name, words[:1].upper() + words[1:], mark, event)
         except KeyError:
             continue
-    return Sentence(event.t_s, event.name, _described(event, fields), mark)
+    return Sentence(event.t_s, event.name, _described(event, fields), mark, event)
+
+
+def continued(last: Sentence, event: Event) -> Sentence | None:
+    """Return `last` and `event` as one change, None where they are two.
+
+    It comes from where the first step began, and the journal has every one of them.
+    """
+    near = event.t_s - last.t_s <= TOGETHER_S
+    first, steps = last.first, last.steps + 1
+    if event.name not in STEPWISE or event.name != last.name or not near or first is None:
+        return None
+    began = {key: value for key, value in first.fields.items() if key.startswith(_BEFORE)}
+    whole = sentence(Event(event.t_s, event.name, {**event.fields, **began}))
+    return replace(whole, text=f"{whole.text}, in {steps} steps", first=first, steps=steps)

@@ -138,3 +138,14 @@ def test_innovations_of_a_law_that_does_not_steer_are_not_judged(
     recent = model.view(99.0).recent
     assert recent.whiteness is None
     assert np.isfinite(recent.innovations).all()
+
+
+def test_thirty_steps_of_the_set_point_leave_the_other_events_on_the_screen(
+    model: LiveModel,
+) -> None:
+    model.note(Event(0.0, "loop.started", {}))
+    for k in range(30):
+        fields = {"before_c": 37.0 + k, "after_c": 38.0 + k}
+        model.note(Event(1.0 + k, "setpoint.changed", fields))
+    names = [each.name for each in model.view(40.0).events]
+    assert names == ["loop.started", "setpoint.changed"]

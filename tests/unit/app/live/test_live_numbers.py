@@ -55,3 +55,8 @@ def test_wall_time_counts_from_the_zero_of_the_loop() -> None:
     assert numbers.wall_time(zero, 3.0) == "00:00:01"
     assert numbers.wall_time(zero, math.nan) == numbers.UNKNOWN
     assert numbers.wall_time(zero, 1e300) == numbers.UNKNOWN
+
+
+def test_words_of_a_log_wear_the_signs_of_the_screen() -> None:
+    words = "expected at most 41.2 +-0.3 degC, got 50 degC"
+    assert numbers.plain(numbers.sentence(words)) == ("expected at most 41.2 ± 0.3 °C, got 50 °C")

@@ -72,6 +72,16 @@ def test_errors_and_units_stand_below_each_other(
     assert inflation.index("1.00 ") + len("1.00") == tick.index("78 ") + len("78")
 
 
+@pytest.mark.parametrize(("utf8", "told"), [(True, "(28–158) s"), (False, "(28-158) s")])
+def test_a_wide_range_keeps_its_brackets(
+    model: LiveModel, make_cycle: MakeCycle, utf8: bool, told: str
+) -> None:
+    wide = Row("lag", "lag", 107.0, None, "s", "107 s", 28.0, 158.0)
+    view = fed(model, make_cycle(0.0), replace(INSIGHT, rows=(*ROWS[:3], wide)))
+    shown = [" ".join(row.split()) for row in texts(view, 80, 24, utf8=utf8)]
+    assert any(row.startswith(f"Lag 107 {told}") for row in shown)
+
+
 def test_a_loss_is_told_in_watts_per_kelvin_as_soon_as_that_is_known(
     model: LiveModel, make_cycle: MakeCycle
 ) -> None:
@@ -231,6 +241,25 @@ def test_a_set_point_out_of_reach_says_what_can_be_held(
     assert "▲ 1 active" in spaced(view)[1]
     over = fed(model, expecting(make_cycle(0.0), most, replace(alarm, active=False)), None)
     assert "out of reach" not in spaced(over)[1]
+
+
+def test_what_can_be_held_is_said_in_eighty_columns_too(
+    model: LiveModel, make_cycle: MakeCycle
+) -> None:
+    alarm = Alarm("setpoint.unreachable", None, 2, 0.0, "at most 41.2 +-0.3 degC")
+    most = Feasible(1.3, 0.02, 41.2, 0.25, math.nan, math.nan)
+    far = make_cycle(0.0, 30.0, setpoint_c=50.0, accepted_power=1.0)
+    row = spaced(fed(model, expecting(far, most, alarm), None), 80, 24)[1]
+    assert "power 100.0 % · at most 41.2 °C" in row
+    assert row.endswith("▲ 1 active")
+
+
+def test_the_coldest_that_can_be_held_is_no_most(model: LiveModel, make_cycle: MakeCycle) -> None:
+    alarm = Alarm("setpoint.unreachable", None, 2, 0.0, "at least 12.1 +-0.3 degC")
+    least = Feasible(1.3, 0.02, 12.1, 0.15, math.nan, math.nan)
+    cold = make_cycle(0.0, 15.0, setpoint_c=8.0)
+    row = spaced(fed(model, expecting(cold, least, alarm), None))[1]
+    assert "out of reach: at least 12.1 ± 0.3 °C" in row
 
 
 def test_nothing_is_expected_of_a_loop_that_is_off(model: LiveModel, make_cycle: MakeCycle) -> None:

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from thermoctl.app.live.sentences import _SENTENCES, Mark, sentence
+from thermoctl.app.live.sentences import _SENTENCES, Mark, continued, sentence
 from thermoctl.signals import Event
 
 
@@ -63,3 +63,24 @@ def test_a_heater_in_doubt_wears_a_mark_and_a_faulty_one_an_alarm():
         for name in ("heater.questioned", "heater.reversed", "heater.no_response")
     }
     assert list(marks.values()) == [Mark.WARNING, Mark.ALARM, Mark.ALARM]
+
+
+def test_a_key_that_is_held_down_makes_one_change_from_where_it_began_to_where_it_ended() -> None:
+    steps = [
+        Event(0.3 * k, "setpoint.changed", {"before_c": 37.0 + k, "after_c": 38.0 + k})
+        for k in range(30)
+    ]
+    said = sentence(steps[0])
+    for event in steps[1:]:
+        said = continued(said, event)
+    assert said.text.replace("\u00a0", " ") == "Set point 67.00 °C, was 37.00 °C, in 30 steps"
+    assert (said.t_s, said.name) == (steps[-1].t_s, "setpoint.changed")
+
+
+def test_what_came_much_later_or_is_something_else_is_an_event_of_its_own() -> None:
+    first = Event(0.0, "setpoint.changed", {"before_c": 37.0, "after_c": 38.0})
+    later = Event(31.0, "setpoint.changed", {"before_c": 38.0, "after_c": 39.0})
+    poured = Event(0.0, "sim.disturbed", {"text": "1 l"})
+    assert continued(sentence(first), later) is None
+    assert continued(sentence(first), poured) is None
+    assert continued(sentence(poured), poured) is None

@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 
 import pytest
 
-from thermoctl.app.live import Action, LiveModel
+from thermoctl.app.live import Action, LiveModel, Look, render
 from thermoctl.app.live.daemon_line import Denied, Gone, Heard, Met, call_for, most_urgent
 from thermoctl.app.live.watch_view import WatchView, facts_of
 from thermoctl.app.sim import bench_settings, simulate
@@ -108,3 +108,9 @@ def test_of_set_points_in_a_row_the_last_one_counts():
 def test_nothing_that_was_asked_before_off_can_come_after_it():
     waiting = [Mode.AUTO, SetPoint(40.0), Acknowledge(), Mode.OFF, SetPoint(20.0)]
     assert most_urgent(waiting) == [Acknowledge(), Mode.OFF, SetPoint(20.0)]
+
+
+def test_a_view_that_was_opened_late_does_not_say_that_nothing_ever_happened():
+    model = LiveModel(facts_of(MET, NOON, 2000.0))
+    rows = [row.plain.rstrip() for row in render(model.view(0.0), 80, 24, Look())]
+    assert "nothing has happened since this view was opened" in rows
