@@ -24,6 +24,8 @@ GAP = 1.5
 
 _JITTER = 0.1
 _JITTER_SHARE = 0.01
+_AS_AIMED = 0.01
+"""A median this near the interval that was aimed at, as a share of it, is that interval."""
 
 TIME_NAMES = ("time_s", "time_utc", "t_s", "time", "timestamp", "datetime", "t")
 OUTPUT_NAMES = ("temperature_c",)
@@ -71,6 +73,8 @@ class Record:
         Rows that were left out.
     notes : tuple of str
         What a reader of results should know: guesses, rows left out, gaps, uneven sampling.
+    nominal_s : float, optional
+        Interval that was aimed at, where it is known.
     """
 
     source: str
@@ -80,11 +84,15 @@ class Record:
     names: Columns
     skipped: int = 0
     notes: tuple[str, ...] = ()
+    nominal_s: float | None = None
 
     @property
     def period_s(self) -> float:
-        """Median interval between two samples, in s."""
-        return float(np.median(np.diff(self.t_s)))
+        """Median interval between two samples, in s; as it was aimed at where that is met."""
+        median_s, nominal_s = float(np.median(np.diff(self.t_s))), self.nominal_s
+        if nominal_s is not None and abs(median_s - nominal_s) <= _AS_AIMED * nominal_s:
+            return nominal_s  # a wake that is 10 us late is no other period
+        return median_s
 
     @property
     def stretch_start(self) -> npt.NDArray[np.intp]:
@@ -103,6 +111,7 @@ class Collector:
     notes: list[str] = field(default_factory=list)
     skipped: int = 0
     first_skipped: str = ""
+    nominal_s: float | None = None
     _t: array[float] = field(default_factory=lambda: array("d"))
     _u: array[float] = field(default_factory=lambda: array("d"))
     _y: array[float] = field(default_factory=lambda: array("d"))
@@ -141,7 +150,9 @@ class Collector:
             raise RecordError(f"{self.source}: expected rows of numbers, {came} sound{first}")
         t_s, u, y = (np.frombuffer(column) for column in (self._t, self._u, self._y))
         notes = [*self.notes, *self._left_out(), *_timing_notes(t_s, self.names.time is not None)]
-        return Record(self.source, t_s - t_s[0], u, y, self.names, self.skipped, tuple(notes))
+        t_s = t_s - t_s[0]
+        told = (self.names, self.skipped, tuple(notes), self.nominal_s)
+        return Record(self.source, t_s, u, y, *told)
 
     def _left_out(self) -> list[str]:
         """Return the note about rows that were left out, if any were."""

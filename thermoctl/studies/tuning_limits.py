@@ -189,7 +189,7 @@ def _rise(plant: _Plant, now: InForce) -> Proposal:
 
 
 def _dead_man(plant: _Plant, now: InForce) -> Proposal:
-    value_s = math.ceil(10.0 * command_lasts_s(plant.period_s)) / 10.0
+    value_s = math.ceil(round(10.0 * command_lasts_s(plant.period_s), 6)) / 10.0
     lasts_s = value_s if now.dead_man_s is None else now.dead_man_s
     rise_k = plant.slope * now.power_max * lasts_s
     why = (

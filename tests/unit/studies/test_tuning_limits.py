@@ -159,3 +159,17 @@ def test_the_page_holds_the_limits_below_its_panels(plant, monkeypatch):
     assert nothing == []
     assert tall_in > short_in + 1.0
     assert "dead_man_s" in told
+
+
+def test_wakes_that_are_a_little_late_are_no_other_period(measured):
+    def recorded(period_s):
+        late = replace(measured.record, t_s=period_s * np.arange(800.0), nominal_s=1.0)
+        return replace(measured, record=late)
+
+    late = recorded(1.00001)
+    assert late.record.period_s == 1.0
+    assert limit(late, "period_s").value == 1.0
+    dead_man = limit(late, "dead_man_s", dead_man_s=2.5)
+    assert dead_man.value == dead_man.now == command_lasts_s(1.0) == 2.5
+    assert "a command is valid for 2.5 s" in dead_man.why
+    assert recorded(1.3).record.period_s == pytest.approx(1.3)

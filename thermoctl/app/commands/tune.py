@@ -42,7 +42,7 @@ from thermoctl.studies.orders import USUAL
 from thermoctl.studies.present import print_lines
 from thermoctl.studies.record import RecordError
 from thermoctl.studies.tuning import needed, tune
-from thermoctl.studies.words import duration
+from thermoctl.studies.words import counted, duration
 
 LONGEST_S: Final = 172_800.0
 """Longest run: two days; all of it is held in memory."""
@@ -246,14 +246,24 @@ def _learnt(
     outcome, collector = ran
     table = settings.loop(name)[1]
     record = tuning = None
-    why = ""
+    why, least = "", needed(asked.orders)
     try:
         record = collector.finish()
-        tuning = tune(record, asked.orders, table.setpoint_c)
-    except RecordError as problem:
-        why = str(problem)
+        if len(record.t_s) >= least:
+            tuning = tune(record, asked.orders, table.setpoint_c)
+        else:
+            why = _too_few(len(record.t_s), least)
+    except RecordError as problem:  # its source is the run that is being told of
+        told = str(problem).removeprefix(f"{collector.source}: ")
+        why = told if record is not None else _too_few(0, least)
     dead_man_s = _dead_man_s(settings, table)
     return Report(name, table, asked.sim, excitation, outcome, record, tuning, why, dead_man_s)
+
+
+def _too_few(samples: int, least: int) -> str:
+    """Return why a run that has ended early teaches nothing."""
+    came = "without a good reading" if not samples else f"after {counted(samples, 'good reading')}"
+    return f"the run ended {came}; these orders need at least {least:,} without a gap"
 
 
 def _dead_man_s(settings: Settings, table: LoopTable) -> float | None:

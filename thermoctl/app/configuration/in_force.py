@@ -13,7 +13,7 @@ from thermoctl.app.settings import Settings
 
 
 def in_force(settings: Settings) -> dict[str, Any]:
-    """Return every key with its value, as `load` takes it, the laws' options included.
+    """Return every key with its value, as `load` takes it, options of laws too.
 
     An option is what the law was built with: where a loop's table decides it, that is its value.
     """

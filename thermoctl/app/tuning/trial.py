@@ -168,7 +168,7 @@ class Trial:
         self._why = ""
         self._failure: Exception | None = None
         self._hottest_c = -math.inf
-        self.record = Collector(f"tune {name}", NAMES)
+        self.record = Collector(f"tune {name}", NAMES, nominal_s=excitation.period_s)
         self.loop = build(self._take)
 
     def run(self) -> Outcome:

@@ -193,6 +193,21 @@ def test_an_interrupted_run_keeps_what_is_finished(monkeypatch):
     assert told["model"] is not None
 
 
+def test_a_run_that_ended_early_says_so_in_plain_words(monkeypatch):
+    from thermoctl.app.tuning import run as tune_run
+
+    class Interrupting(tune_run.Trial):
+        def _follow(self, cycle):
+            super()._follow(cycle)
+            if cycle.step.t_s == 40.0:
+                os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(tune_run, "Trial", Interrupting)
+    _, printed, _ = run("--sim", "--out", "o")
+    words = "the run ended after 41 good readings; these orders need at least 149 without a gap"
+    assert f"Nothing was learnt: {words}" in printed
+
+
 def test_a_fault_is_told_and_ends_with_1():
     Path("null.toml").write_text(BOARD)
     assert code_of("-c", "null.toml", "--yes", "--out", "o") == 1
@@ -201,7 +216,7 @@ def test_a_fault_is_told_and_ends_with_1():
     assert told["why"]
     assert told["off_confirmed"] is True
     assert told["chosen"] is None
-    assert told["undecided"]
+    assert told["undecided"].startswith("the run ended without a good reading")
 
 
 def test_a_board_that_a_daemon_holds_is_left_alone(tmp_path):
