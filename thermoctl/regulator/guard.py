@@ -37,7 +37,9 @@ def attempt(law: Callable[[*Given], T], *given: *Given) -> T | Failure:
 
 def _failure(error: Exception) -> Failure:
     """Return in words what is being handled."""
-    text = f"expected a result, got {type(error).__name__}: {error}"
+    text = str(error)
+    if not text.startswith("expected "):  # it says what was expected, and what came
+        text = f"expected a result, got {type(error).__name__}: {text}"
     return Failure(text, traceback.format_exc())
 
 

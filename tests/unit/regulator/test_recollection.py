@@ -70,6 +70,13 @@ def test_a_model_that_is_refused_is_ignored_with_the_reason(model):
     assert "bad" in fields["why"] or "odd" in fields["why"]
 
 
+def test_what_was_expected_is_said_once():
+    ((_, fields),) = events(first_step(regulator(remembered={"pid": {"bad": 1}})))
+    assert fields["why"] == "expected nothing bad, got it"
+    ((_, fields),) = events(first_step(regulator(remembered={"pid": {"odd": 1}})))
+    assert fields["why"] == "expected a result, got KeyError: 'odd'"
+
+
 def test_a_model_of_a_law_that_is_not_there_is_left_alone():
     assert events(first_step(regulator(remembered={"adaptive": {"bad": 1}}))) == []
 

@@ -23,6 +23,9 @@ DROP_ODDS = -3.0
 HEARD_S, HEARD_LAGS = 60.0, 3.0
 """The trial is over after so much of exciting time, and so many lags of it."""
 
+_EVEN_ODDS, _SAID_ODDS = math.log(1.5), math.log(1000.0)
+"""Below the first, odds are said to be even; beyond the other, how long they are says no more."""
+
 TRUSTED, DROPPED = "model.trusted", "model.dropped"
 
 
@@ -86,10 +89,20 @@ def _judged(bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:
     rival, odds, heard_s = memory.rival, memory.odds, memory.heard_s
     if rival is None or bank.outlook is None:
         return bank, memory
-    words = f"log odds {odds:.1f} for the stored model after {heard_s:.0f} s of changing power"
     enough_s = max(HEARD_S, HEARD_LAGS * bank.outlook.lag_s)
     if odds < DROP_ODDS or (odds < 0.0 and heard_s >= enough_s):
-        return rival, Memory(None, odds, heard_s, DROPPED, words)
+        return rival, Memory(None, odds, heard_s, DROPPED, _words(odds, heard_s))
     if heard_s >= enough_s:
-        return bank, Memory(None, odds, heard_s, TRUSTED, words)
+        return bank, Memory(None, odds, heard_s, TRUSTED, _words(odds, heard_s))
     return bank, memory
+
+
+def _words(odds: float, heard_s: float) -> str:
+    """Return how much better which of the two foresaw the readings."""
+    after = f"after {heard_s:.0f} s of changing power"
+    if abs(odds) < _EVEN_ODDS:
+        as_well = "no better than" if odds < 0.0 else "as well as"
+        return f"the stored model foresees {as_well} one that knew nothing, {after}"
+    times = f"{math.exp(min(abs(odds), _SAID_ODDS)):,.0f}"
+    more = "more than " if abs(odds) > _SAID_ODDS else ""
+    return f"{more}{times} to 1 {'for' if odds > 0.0 else 'against'} the stored model {after}"
