@@ -88,7 +88,7 @@ class Record:
 
     @property
     def period_s(self) -> float:
-        """Median interval between two samples, in s; as it was aimed at where that is met."""
+        """Median interval between two samples in s, or what was aimed at if that is met."""
         median_s, nominal_s = float(np.median(np.diff(self.t_s))), self.nominal_s
         if nominal_s is not None and abs(median_s - nominal_s) <= _AS_AIMED * nominal_s:
             return nominal_s  # a wake that is 10 us late is no other period

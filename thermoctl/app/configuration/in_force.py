@@ -13,7 +13,7 @@ from thermoctl.app.settings import Settings
 
 
 def in_force(settings: Settings) -> dict[str, Any]:
-    """Return every key with its value, as `load` takes it, options of laws too.
+    """Return every key with its value, options of laws too, as `load` takes it.
 
     An option is what the law was built with: where a loop's table decides it, that is its value.
     """
