@@ -33,6 +33,9 @@ SIGMAS = 6.0
 """A deviation is none below so many of its usual ones."""
 NOISES = 5.0
 """Nor below so many times the noise of a reading."""
+FRESH, FRESH_TIMES = 2, 2.0
+"""What is usual is known after as many blocks as the line has. Before that, and after so many short
+times, a deviation has to be so many times as large."""
 FLAT, FLAT_USUAL = 0.05, 0.5
 """What grows in a short time by less than this share of itself, and this much of what is usual, is
 over."""
@@ -231,8 +234,9 @@ class ChangeWatch:
             readings, line = past
             deviation_k = self._blocks.balance[-1] - line.at(self._seen)
             limit_k = max(SIGMAS * usual.sd, NOISES * noise_sd_k)
-            known = usual.count >= BASE * BLOCKS
-            if known and abs(deviation_k) > limit_k:
+            if usual.count < BASE * BLOCKS:
+                limit_k *= FRESH_TIMES
+            if usual.count >= FRESH * BLOCKS and abs(deviation_k) > limit_k:
                 if suspicious is None:
                     suspicious = _Event(line, float(readings.mean()), self._usual[1].sd)
             else:

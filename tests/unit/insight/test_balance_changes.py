@@ -43,6 +43,14 @@ def test_heat_that_comes_or_goes_at_once_is_measured_and_dated(step_k):
     assert found.before_c == pytest.approx(37.5, abs=0.05)
 
 
+@pytest.mark.parametrize("step_k", [-3.0, 1.5])
+def test_a_large_one_is_found_before_it_is_known_what_is_usual(step_k):
+    early = 800
+    (found,) = watched(early + 900, befall=lambda k, T, d: (T + step_k * (k == early), d))
+    assert found.step_k == pytest.approx(step_k, rel=0.15)
+    assert found.t_s == pytest.approx(early, abs=20.0)
+
+
 def test_ice_that_takes_two_minutes_to_melt_is_one_step():
     (found,) = watched(AT + 1500, befall=lambda k, T, d: (T - 0.03 * (AT <= k < AT + 120), d))
     assert found.step_k == pytest.approx(-3.6, rel=0.06)
@@ -57,7 +65,7 @@ def test_a_loss_that_changes_for_good_is_a_slope(more):
     assert len(found) == 1
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
 def test_nothing_is_found_where_nothing_happens(seed):
     assert watched(6000, seed) == []
 
