@@ -23,17 +23,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
-T, BETA, D, K, G = range(5)
-Row = tuple[float, ...]
-"""A number for each of the five."""
+from thermoctl.control.heat_belief import (
+    BETA,
+    WARMS_AT_MOST_K,
+    D,
+    G,
+    HeatBelief,
+    K,
+    Known,
+    Row,
+    T,
+)
 
 START_SD = (0.1, 0.15, 0.01, 1e-3, 1e-3)
 """Of T in K, beta and d in K/s, k and g in 1/s: wide, but for a plant that begins near its rest."""
-SIGN_SDS = 1.5
-"""So many standard deviations from 0 the direction of the gain is taken for known."""
 SCALED = 0.2
 """Once the rate at full power is known to this share, it is the scale of what follows:"""
 LOSS_SHARE, WARMS_K, SOAKS_K = 0.3, 30.0, 80.0
@@ -52,14 +58,12 @@ VAGUE = 0.3
 """A gain or slope that is known to no better than this share drifts no further."""
 BEND, BEND_SD = 0.01, 0.015
 """Change of the slope in a kelvin, as a share of it, and how uncertain that is."""
-WARMS_AT_MOST_K = 500.0
-"""Full power takes no plant farther above its rest; this bounds the slope from below."""
 
 NEARLY_K = 0.1
 """Water, and what a sensor shows of it, differ by about so much."""
 
-R_FIRST, R_MIN = 4e-4, 1e-6
-"""Variance of a stretch's mean reading in K²."""
+R_MIN = 1e-6
+"""Variance of a stretch's mean reading is no less, in K²."""
 LAG_SHARE = 2.0
 """Share of that which may come earlier or later than a lag of first order has it."""
 GATE = 9.0
@@ -67,13 +71,6 @@ GATE_STRETCHES = 6
 CHANGED_AFTER, FORGIVEN = 3, 0.25
 """So many jumps are another plant, and not a litre of cold water; a stretch without any makes up
 for this much of one."""
-
-
-class Known(NamedTuple):
-    """A number with its standard deviation; NaN where nothing is known."""
-
-    mean: float = math.nan
-    sd: float = math.nan
 
 
 class Stretch(NamedTuple):
@@ -95,75 +92,6 @@ class Stretch(NamedTuple):
     heat_s: float
     reading_c: float
     late_s: float = 0.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class HeatBelief:
-    """What is believed of gain and loss.
-
-    Plain numbers: for so few of them arrays take twice as long.
-
-    Parameters
-    ----------
-    x : tuple of float
-        Mean of T in degC, beta and d in K/s, k and g in 1/s.
-    P : tuple of tuple of float
-        Their covariance, row by row.
-    centre_c : float
-        Temperature of which d is the loss.
-    wall_c : float
-        Temperature of what follows more slowly.
-    stretches : int
-        How many had a reading.
-    R : float
-        Variance of a mean reading in K².
-    before_c : tuple of float
-        The last two mean readings.
-    jumps : float
-        Stretches that ended where the plant could not be, as far as they are not forgiven.
-    scaled : bool
-        Whether the plant's own rate has taken the place of `START_SD`.
-    """
-
-    x: Row
-    P: tuple[Row, ...]
-    centre_c: float
-    wall_c: float
-    stretches: int = 0
-    R: float = R_FIRST
-    before_c: tuple[float, float] = (math.nan, math.nan)
-    jumps: float = 0.0
-    scaled: bool = False
-
-    @property
-    def finite(self) -> bool:
-        """Whether every number of mean and covariance is finite."""
-        return math.isfinite(sum(self.x) + sum(map(sum, self.P)))
-
-    @property
-    def gain(self) -> float:
-        """Heating rate at full power in K/s; negative where power cools."""
-        return self.x[BETA]
-
-    @property
-    def gain_known(self) -> bool:
-        """Whether it is certain that power does something, and in which direction."""
-        return abs(self.gain) > SIGN_SDS * math.sqrt(self.P[BETA][BETA])
-
-    @property
-    def ahead_k(self) -> float:
-        """How far the plant is ahead of its walls."""
-        return self.x[T] - self.wall_c
-
-    @property
-    def slope(self) -> float:
-        """Slope of the loss in 1/s, at least what `WARMS_AT_MOST_K` allows."""
-        return max(self.x[K], abs(self.gain) / WARMS_AT_MOST_K)
-
-    @property
-    def soaks(self) -> float:
-        """Rate in 1/s at which walls take up heat; one that gives it off is none."""
-        return max(self.x[G], 0.0)
 
 
 def start(reading_c: float) -> HeatBelief:
@@ -203,11 +131,13 @@ def _met(
     with_it = P[place]
     S = with_it[place] + R
     met = tuple([mean + p / S * nu for mean, p in zip(x, with_it, strict=True)])
-    # Products before quotients: so P stays symmetric to the last bit.
+    # Products before quotients: so P stays symmetric to the last bit. Written out for all five, it
+    # takes half the time of a loop within the loop.
+    a, b, c, d, e = with_it
     return met, tuple(
         [
-            tuple([p - g * q / S for p, q in zip(row, with_it, strict=True)])
-            for row, g in zip(P, with_it, strict=True)
+            (p - g * a / S, q - g * b / S, r - g * c / S, s - g * d / S, t - g * e / S)
+            for (p, q, r, s, t), g in zip(P, with_it, strict=True)
         ]
     )
 
@@ -296,14 +226,29 @@ def spare(
     Its walls are colder by `ahead_k`: 0 once it has been there for long. With a `straight` loss,
     that is at least as much as with one that bends.
     """
-    off_k, steep = at_c - belief.centre_c, belief.slope
-    away_k = at_c - belief.x[T]
-    bent = 0.0 if straight else 0.5 * steep * away_k * abs(away_k)
-    mean = power * belief.gain - belief.x[D] - steep * off_k - belief.soaks * ahead_k
-    variance = _variance(belief, (power, -1.0, -off_k, -ahead_k))
+    mean = _spare_mean(belief, at_c, power, ahead_k, straight=straight)
+    return Known(mean, _spare_sd(belief, at_c, power, ahead_k, straight=straight))
+
+
+def _spare_mean(
+    belief: HeatBelief, at_c: float, power: float, ahead_k: float = 0.0, *, straight: bool = False
+) -> float:
+    """Return the mean of `spare`."""
+    x, steep = belief.x, belief.slope
+    mean = power * x[BETA] - x[D] - steep * (at_c - belief.centre_c) - belief.soaks * ahead_k
+    away_k = at_c - x[T]
+    return mean if straight or away_k <= 0.0 else mean - BEND * (0.5 * steep * away_k * away_k)
+
+
+def _spare_sd(
+    belief: HeatBelief, at_c: float, power: float, ahead_k: float = 0.0, *, straight: bool = False
+) -> float:
+    """Return the standard deviation of `spare`."""
+    steep, away_k = belief.slope, at_c - belief.x[T]
+    bent = 0.0 if straight else 0.5 * steep * away_k * away_k
+    variance = _variance(belief, (power, -1.0, belief.centre_c - at_c, -ahead_k))
     taken = WALL_SHARE * steep * (belief.ahead_k - ahead_k)
-    variance += (BEND_SD * bent) ** 2 + taken * taken
-    return Known(mean - BEND * max(bent, 0.0), math.sqrt(variance))
+    return math.sqrt(variance + ((BEND_SD * bent) ** 2 + taken * taken))
 
 
 def holding(belief: HeatBelief, at_c: float) -> Known:
@@ -311,8 +256,8 @@ def holding(belief: HeatBelief, at_c: float) -> Known:
     if not belief.gain_known:
         return Known()
     beta = belief.gain
-    power = -spare(belief, at_c, 0.0).mean / beta
-    return Known(power, spare(belief, at_c, power).sd / abs(beta))
+    power = -_spare_mean(belief, at_c, 0.0) / beta
+    return Known(power, _spare_sd(belief, at_c, power) / abs(beta))
 
 
 def reach(belief: HeatBelief, power: float) -> Known:
@@ -323,14 +268,14 @@ def reach(belief: HeatBelief, power: float) -> Known:
     if not belief.gain_known:
         return Known()
     now_c, steep = belief.x[T], belief.slope
-    rate = spare(belief, now_c, power)
-    rise_k = _bent(rate.mean / steep)
-    there = spare(belief, now_c + rise_k, power)
+    rate = _spare_mean(belief, now_c, power)
+    rise_k = _bent(rate / steep)
+    there_sd = _spare_sd(belief, now_c + rise_k, power)
     steep_sd = math.sqrt(belief.P[K][K])
     flatter = max(steep - steep_sd, abs(belief.gain) / WARMS_AT_MOST_K)
     sd_k = max(
-        there.sd / (steep * (1.0 + BEND * max(rise_k, 0.0))),
-        abs(_bent(rate.mean / flatter) - rise_k),
+        there_sd / (steep * (1.0 + BEND * max(rise_k, 0.0))),
+        abs(_bent(rate / flatter) - rise_k),
     )
     return Known(now_c + rise_k, sd_k)
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from thermoctl.control import heat_loss
-from thermoctl.control.heat_loss import HeatBelief, Known, Stretch
+from thermoctl.control.heat_belief import HeatBelief, Known, T
+from thermoctl.control.heat_loss import Stretch
 from thermoctl.quantities import clamp
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.foretold import Settling, Slip
@@ -290,7 +291,7 @@ class Feasibility:
         on: a controller that takes its power back in vain teaches that power does the opposite.
         """
         sign = -1.0 if wanted.power_cools else 1.0
-        here_c, gain = sign * belief.x[heat_loss.T], sign * belief.gain
+        here_c, gain = sign * belief.x[T], sign * belief.gain
         self._alone.seen(here_c)
         way_k = here_c - sign * wanted.setpoint_c
         known = belief.gain_known
@@ -340,7 +341,7 @@ def _missing_sds(belief: HeatBelief, wanted: Wanted, full: bool) -> float:
     """
     if wanted.beyond_ceiling:
         return math.inf
-    here_c = belief.x[heat_loss.T]
+    here_c = belief.x[T]
     way_k = wanted.setpoint_c - here_c
     towards = math.copysign(1.0, way_k)
     if belief.gain_known and towards * belief.gain < 0.0:
@@ -355,16 +356,16 @@ def _missing_sds(belief: HeatBelief, wanted: Wanted, full: bool) -> float:
 
 def _driven_words(_: Feasible, belief: HeatBelief, wanted: Wanted) -> str:
     """Return what was expected of a plant without power, and what came."""
-    minute_k = 60.0 * heat_loss.spare(belief, belief.x[heat_loss.T], 0.0).mean
+    minute_k = 60.0 * heat_loss.spare(belief, belief.x[T], 0.0).mean
     return (
         f"expected the plant to come to {wanted.setpoint_c:g} degC without power, it moves by "
-        f"{minute_k:+.2f} K a minute at {belief.x[heat_loss.T]:.1f} degC"
+        f"{minute_k:+.2f} K a minute at {belief.x[T]:.1f} degC"
     )
 
 
 def _missing_words(known: Feasible, belief: HeatBelief, wanted: Wanted) -> str:
     """Return what was expected of the set point, and what came."""
-    here_c = belief.x[heat_loss.T]
+    here_c = belief.x[T]
     side = "most" if wanted.setpoint_c > here_c else "least"
     which = "full power" if wanted.power_max == 1.0 else f"a power of {wanted.power_max:g}"
     limit = f"{known.highest_c:.1f} +-{known.highest_sd_k:.1f} degC"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from thermoctl.control.heat_loss import Known
+from thermoctl.control.heat_belief import Known
 
 SLIPS_S, SETTLES_S = 600.0, 600.0
 """Memory of how late an arrival was, and of the power that was told to hold."""

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from thermoctl.control import heat_loss
-from thermoctl.control.heat_loss import Known, Stretch
+from thermoctl.control.heat_belief import Known
+from thermoctl.control.heat_loss import Stretch
 
 SPAN_S = 10.0
 REST_C, SLOPE, GAIN = 15.0, 2e-4, 0.02

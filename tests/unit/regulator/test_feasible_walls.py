@@ -7,7 +7,7 @@ import pytest
 
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
-from thermoctl.control.heat_loss import Known
+from thermoctl.control.heat_belief import Known
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.feasible import Feasibility, Wanted
 from thermoctl.regulator.foretold import Settling, Slip
