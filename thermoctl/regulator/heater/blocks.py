@@ -57,7 +57,8 @@ class Blocks:
             if second == second:
                 square, most = second * second / _SPREAD, _MOST * self._variance
                 self._variance += _MEMORY * ((square if square < most else most) - self._variance)
-                self._variance = max(self._variance, NOISE_MIN_K2)
+                if self._variance < NOISE_MIN_K2:
+                    self._variance = NOISE_MIN_K2
         return self._complete() if self._span_s >= self._least_s else None
 
     def _complete(self) -> Block:
@@ -98,7 +99,7 @@ class Repeats:
             return self._stands()
         if reading_c == reading_c:
             moved_k = reading_c - self._last_c
-            if not self._stands():  # a run that was a fault teaches nothing
+            if self._run < self.LEAST or not self._stands():  # a run that was a fault says nothing
                 self._learn(moved_k * self._moved_k < 0.0)
             self._moved_k, self._last_c, self._run = moved_k, reading_c, 0
         return False

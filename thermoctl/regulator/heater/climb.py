@@ -124,11 +124,13 @@ class Climb:
 
     def calm(self, sd_k: float) -> bool:
         """Return whether nothing is missing, so that gain and loss may be learnt."""
+        if self._missing_k <= CALM * LEAST_K:  # nearly always
+            return True
         return self._missing_k <= max(CALM * self._limit_k(sd_k), CALM_SDS * sd_k)
 
     def stalled(self, sd_k: float) -> bool:
         """Return whether the reading does not rise as it did under the same power."""
-        return self._missing_k > self._limit_k(sd_k)
+        return self._missing_k > LEAST_K and self._missing_k > self._limit_k(sd_k)
 
     def told(self, now: Seen) -> str:
         """Return what was expected since the climb began to be missing, and what came."""

@@ -149,8 +149,10 @@ class HeatDoubt:
 
     def calm(self, gain: Gain, sd_k: float) -> bool:
         """Return whether nothing is in doubt, so that gain and loss may be learnt."""
-        nothing_k = max(CALM * _limit_k(gain, sd_k, LAGS), CALM_SDS * sd_k)
-        return max(self._missing_k, self._extra_k) < nothing_k
+        worst_k = max(self._missing_k, self._extra_k)
+        if worst_k < CALM * LEAST_K:  # nearly always
+            return True
+        return worst_k < max(CALM * _limit_k(gain, sd_k, LAGS), CALM_SDS * sd_k)
 
     def cold(self, gain: Gain, sd_k: float, *, again: bool = False) -> bool:
         """Return whether the reading fails to answer; sooner `again`, after a bad answer."""
@@ -158,6 +160,8 @@ class HeatDoubt:
 
     def short(self, gain: Gain, sd_k: float, *, again: bool) -> bool:
         """Return whether the reading has not risen as the heat should have made it."""
+        if self._missing_k <= LEAST_K:  # nearly always
+            return False
         return self._missing_k > _limit_k(gain, sd_k, LAGS_AGAIN if again else LAGS)
 
     @property
@@ -172,7 +176,7 @@ class HeatDoubt:
 
     def hot(self, gain: Gain, sd_k: float) -> bool:
         """Return whether the reading rises beyond what any power explains."""
-        return self._extra_k > _limit_k(gain, sd_k, EXTRA_LAGS)
+        return self._extra_k > LEAST_K and self._extra_k > _limit_k(gain, sd_k, EXTRA_LAGS)
 
     def compare(
         self,

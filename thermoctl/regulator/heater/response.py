@@ -101,7 +101,8 @@ class Gain(NamedTuple):
 class _Path:
     """One lag: heat on its way, a straight line through what has arrived, and the regression.
 
-    Plain numbers: for so few lags they are several times as fast as arrays.
+    Plain numbers: for so few lags they are several times as fast as arrays. What is done with every
+    lag in every block stands in a loop, for a call of a method would cost more than what it does.
     """
 
     __slots__ = (
@@ -127,22 +128,8 @@ class _Path:
     def begin_again(self) -> None:
         self.first = self.second = self.heat_s = self.line = self.slope = self.off = 0.0
 
-    def arrive(self, span_s: float, power: float) -> None:
-        step = self.step
-        self.first = first = self.first + step * (power - self.first)
-        self.second = second = self.second + step * (first - self.second)
-        self.heat_s = heat_s = self.heat_s + span_s * second
-        self.line = line = self.line + span_s * self.slope
-        self.off = heat_s - line
-
     def stand(self) -> None:
         self.line, self.off = self.heat_s, 0.0
-
-    def learn(self, keep: float, rest_k: float, total_ks: float) -> None:
-        off = self.off
-        self.squares = keep * self.squares + off * off
-        self.products = keep * self.products + off * rest_k
-        self.along = keep * self.along + off * total_ks
 
 
 class _Total:
@@ -236,7 +223,7 @@ class HeatResponse:
         if learn and self._moving_s > 0.0:
             self._learn(rest_k, block)
         total.follow(by, by_per_s)
-        for path in paths:  # no method: a call for every lag would cost more than this
+        for path in paths:
             path.line += by * path.off
             path.slope += by_per_s * path.off
 
@@ -273,7 +260,12 @@ class HeatResponse:
             for path in self._paths:
                 path.step = -math.expm1(-span_s / path.pole_s)
         for path in self._paths:
-            path.arrive(span_s, power)
+            step = path.step
+            path.first = first = path.first + step * (power - path.first)
+            path.second = second = path.second + step * (first - path.second)
+            path.heat_s = heat_s = path.heat_s + span_s * second
+            path.line = line = path.line + span_s * path.slope
+            path.off = heat_s - line
         self.heat_s = tuple([path.heat_s for path in self._paths[: len(LAGS_S)]])
         away = power - self._mean_power
         self._mean_power += min(span_s / MEAN_S, 1.0) * away
@@ -287,8 +279,12 @@ class HeatResponse:
     def _learn(self, rest_k: float, block: Block) -> None:
         """Add what is left of a block to the regression."""
         keep, total = math.exp(-block.span_s / MEMORY_S), self._total
+        total_ks = total.off
         for path in self._paths:
-            path.learn(keep, rest_k, total.off)
+            off = path.off
+            path.squares = keep * path.squares + off * off
+            path.products = keep * path.products + off * rest_k
+            path.along = keep * path.along + off * total_ks
         total.learn(keep, rest_k)
         self._squares = keep * self._squares + rest_k * rest_k
         self._blocks = keep * self._blocks + 1.0
