@@ -36,16 +36,19 @@ NORMAL_SD = 1.4826
 _WITH_R2 = (CorrectedKalman, RandomWalkKalman)
 
 
+_Parallel = Array | tuple[float, float]
+"""Theta and P of the parallel least squares: a stack; of one parameter plain numbers."""
+
+
 class _Memory(NamedTuple):
     """What the guards remember: spread of the regressor, parallel least squares, residuals.
 
-    The least squares are a stack of theta and P. The residuals are there twice, newest first and by
-    size; nobody writes to either.
+    The residuals are there twice, newest first and by size; nobody writes to either.
     """
 
     phi_mean: tuple[float, ...]
     spread_squared: float
-    parallel: Array
+    parallel: _Parallel
     residuals: tuple[float, ...] = ()
     ranked: Sequence[float] = ()
 
@@ -182,18 +185,30 @@ class Guarded:
         """Return the memory after a usable sample; it begins with the stack `rows`."""
         values = phi.tolist()
         if memory is None:
-            parallel = rows.copy()
-            parallel[1:] /= getattr(self.law, "R2", 1.0)  # least squares counts in units of noise
-            memory = _Memory(tuple(values), 0.0, frozen(parallel))
+            memory = _Memory(tuple(values), 0.0, self._parallel(rows))
         phi_mean, spread_squared = _moved(memory, values)
         if not self.robust_R2:
             return _Memory(phi_mean, spread_squared, memory.parallel)
-        parallel, newest = memory.parallel, None
-        learned = PARALLEL.learn(parallel, phi, y)
-        if learned is not None:
-            parallel, newest = learned[0], abs(learned[1])
+        parallel, newest = _learned(memory.parallel, phi, y)
         residuals, ranked = _renewed(memory.residuals, memory.ranked, newest)
         return _Memory(phi_mean, spread_squared, parallel, residuals, ranked)
+
+    def _parallel(self, rows: Array) -> _Parallel:
+        """Return the least squares that begin with the stack `rows`."""
+        parallel = rows.copy()
+        parallel[1:] /= getattr(self.law, "R2", 1.0)  # least squares counts in units of noise
+        if parallel.size == 2:
+            return parallel.item(0), parallel.item(1)
+        return frozen(parallel)
+
+
+def _learned(parallel: _Parallel, phi: Array, y: float) -> tuple[_Parallel, float | None]:
+    """Return the least squares after a sample, and how far off it was; None: nobody knows."""
+    if isinstance(parallel, tuple):
+        one = PARALLEL.learn_one(*parallel, phi.item(), y)
+        return (parallel, None) if one is None else (one[:2], abs(one[2]))
+    learned = PARALLEL.learn(parallel, phi, y)
+    return (parallel, None) if learned is None else (learned[0], abs(learned[1]))
 
 
 def _adopted(belief: Estimate) -> GuardedEstimate:

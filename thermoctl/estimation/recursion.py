@@ -36,7 +36,7 @@ from thermoctl.estimation.belief import (
     scalar,
     shown,
 )
-from thermoctl.estimation.stack import Learned, stack, unstacked
+from thermoctl.estimation.stack import Learned, LearnedOne, stack, unstacked
 from thermoctl.quantities import Array, is_finite_number
 from thermoctl.signals import Estimate
 
@@ -120,7 +120,8 @@ class RecursiveLaw(ABC):
         if phi.shape != rows.shape[1:]:
             raise ValueError(f"phi must have shape {rows.shape[1:]}, got {phi.shape}")
         if phi.shape == (1,):
-            return self._learn_one(rows.item(0), rows.item(1), phi.item(), y)
+            one = self.learn_one(rows.item(0), rows.item(1), phi.item(), y)
+            return None if one is None else _stacked(*one)
         # Plain floats add up without a warning; the comparison is false for NaN. Once phi, and
         # below e, are known to be sane, nothing here can overflow.
         if not sum(map(abs, phi.tolist())) < LARGEST:
@@ -148,8 +149,8 @@ class RecursiveLaw(ABC):
         flat = rows.ravel()
         return (frozen(rows), e, S, inflation) if flat.dot(flat) < LARGEST * LARGEST else None
 
-    def _learn_one(self, theta: float, P: float, phi: float, y: float) -> Learned | None:
-        """Return the same for one parameter: in plain floats it takes half the time."""
+    def learn_one(self, theta: float, P: float, phi: float, y: float) -> LearnedOne | None:
+        """Return the same for one parameter, in plain floats: a third of the time."""
         if not abs(phi) < LARGEST:
             return None
         e, g = y - theta * phi, P * phi
@@ -164,9 +165,14 @@ class RecursiveLaw(ABC):
         P += drift(R1, 1).item() if isinstance(R1, np.ndarray) else R1  # O21 (20)
         if not theta * theta + P * P < LARGEST * LARGEST:
             return None
-        rows = np.empty((2, 1))
-        rows[0, 0], rows[1, 0] = theta, P
-        return frozen(rows), e, S, inflation
+        return theta, P, e, S, inflation
+
+
+def _stacked(theta: float, P: float, e: float, S: float, inflation: float) -> Learned:
+    """Return what was learnt of one parameter as a stack."""
+    rows = np.empty((2, 1))
+    rows[0, 0], rows[1, 0] = theta, P
+    return frozen(rows), e, S, inflation
 
 
 def regressor(phi: npt.ArrayLike) -> Array:

@@ -20,6 +20,9 @@ from thermoctl.signals import Estimate
 Learned = tuple[Array, float, float, float]
 """What a sample makes of a stack: the new one, innovation, its variance, inflation of P."""
 
+LearnedOne = tuple[float, float, float, float, float]
+"""The same of one parameter: theta, P, innovation, its variance, inflation of P."""
+
 
 @quickly_filled
 @dataclass(frozen=True, slots=True, eq=False)
