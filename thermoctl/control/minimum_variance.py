@@ -117,7 +117,10 @@ class SelfTuningMinimumVariance:
         if gain_k < self.gain_min_k:
             least = f"{self.gain_min_k:.3g} K a sample at full power"
             gain = f"expected at least {least}, got {gain_k:.3g}"
-        return Conditions(belief.zeros.after(zeros), belief.gain.after(gain))
+        met = belief.zeros.after(zeros), belief.gain.after(gain)
+        if met[0] is belief.zeros and met[1] is belief.gain:  # nearly always
+            return belief
+        return Conditions(*met)
 
     def decide(self, belief: Conditions, situation: Situation) -> tuple[Conditions, float]:
         """Return the next interval's power, unbounded; NaN when not known."""

@@ -31,9 +31,10 @@ class Holding(NamedTuple):
             return self
         if abs(deviation_k) > NEAR_K:
             return Holding()
-        held_s = self.held_s + interval_s
-        share = min(1.0, interval_s / min(held_s, MEMORY_S))
-        return Holding(self.power + share * (applied - self.power), held_s)
+        power, held_s = self
+        held_s += interval_s
+        share = min(1.0, interval_s / (held_s if held_s < MEMORY_S else MEMORY_S))
+        return Holding(power + share * (applied - power), held_s)
 
     @property
     def known(self) -> float | None:

@@ -7,6 +7,7 @@ supervisor's business (`thermoctl.regulator.supervisor`).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -64,17 +65,22 @@ class Judged(NamedTuple):
 
 
 def judge(
-    memory: Judged, measurement: Measurement, limits: Limits, jump_k: float | None = None
+    memory: Judged,
+    measurement: Measurement,
+    limits: Limits,
+    jump_k: Callable[[], float] | None = None,
 ) -> Judged:
     """Return the verdict on `measurement`, with the memory for the next one.
 
-    `jump_k` is the jump that the plant could make, that of `limits` when not given.
+    `jump_k` returns the jump that the plant could make, that of `limits` when not given; it is
+    asked where a reading lies farther off than that.
 
     An outlier is believed when it repeats: after two in a row, a third that agrees with the one
     before it means that the water has jumped, as it does when a jug of cold water goes in.
     """
     quality = measurement.quality  # a plug-in's may be anything, even what has no hash
-    circuit = _CIRCUIT.get(quality) if isinstance(quality, str) else None
+    good = quality is Quality.GOOD
+    circuit = _CIRCUIT.get(quality) if not good and isinstance(quality, str) else None
     if circuit is not None:
         return memory._replace(verdict=circuit)
     temperature_c = measurement.temperature_c
@@ -88,10 +94,10 @@ def judge(
         return memory._replace(verdict=Verdict.OVER)
     if under and limits.can_cool:
         return memory._replace(verdict=Verdict.UNDER)
-    if quality is not Quality.GOOD:
+    if not good:
         return memory._replace(verdict=Verdict.MISSING)
-    judged = _judge_step(memory, temperature_c, limits, limits.jump_k if jump_k is None else jump_k)
-    if judged.verdict is Verdict.GOOD and (over or under):
+    judged = _judge_step(memory, temperature_c, limits, jump_k)
+    if (over or under) and judged.verdict is Verdict.GOOD:
         return judged._replace(verdict=Verdict.OVER if over else Verdict.UNDER)
     return judged
 
@@ -112,7 +118,9 @@ def farthest(measurement: Measurement, limits: Limits) -> tuple[float, float]:
 _CIRCUIT = {Quality.OPEN: Verdict.OPEN, Quality.SHORT: Verdict.SHORT}
 
 
-def _judge_step(memory: Judged, temperature_c: float, limits: Limits, jump_k: float) -> Judged:
+def _judge_step(
+    memory: Judged, temperature_c: float, limits: Limits, jump_k: Callable[[], float] | None
+) -> Judged:
     if math.isnan(memory.last_good_c):
         return Judged(Verdict.GOOD, last_good_c=temperature_c)
     step_k = abs(temperature_c - memory.last_good_c)
@@ -120,7 +128,7 @@ def _judge_step(memory: Judged, temperature_c: float, limits: Limits, jump_k: fl
     if step_k <= limits.jump_k:  # nearly always, and no threshold is lower
         return Judged(Verdict.GOOD, temperature_c, math.nan, 0, steps_k)
     widened_k = min(_STEP_FACTOR * memory.usual_step_k, _THRESHOLDS_MAX * limits.jump_k)
-    threshold_k = max(jump_k, widened_k)
+    threshold_k = max(limits.jump_k if jump_k is None else jump_k(), widened_k)
     repeated = (
         memory.outliers >= limits.OUTLIERS and abs(temperature_c - memory.suspect_c) <= threshold_k
     )

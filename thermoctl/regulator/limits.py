@@ -137,7 +137,7 @@ class Limits:
 
     def seen_s(self, interval_s: float) -> float:
         """Return how much of the time since the last sample a good reading answers for."""
-        return min(interval_s, self.hold_s)
+        return interval_s if interval_s <= self.HOLD_S else min(interval_s, self.hold_s)
 
     def jump_for(self, gain: float, gain_sd: float) -> float:
         """Return `jump_k`, or what a plant of the largest gain believed in may do.
@@ -154,10 +154,6 @@ class Limits:
         largest = min(abs(gain) + 2.0 * gain_sd, self.STEEPEST_K_PER_S)
         explained_k = min(2.0 * largest * self.period_s, self.WIDEST_K)
         return explained_k if self.jump_widens and explained_k > self.jump_k else self.jump_k
-
-    def valid_until_s(self, t_s: float) -> float:
-        """Return when a command of `t_s` expires: half a period late, and a second."""
-        return t_s + command_lasts_s(self.period_s)
 
     def accept_setpoint(self, value: object) -> float:
         """Return `value` as a set point in degC; raise `Refused` naming the range."""

@@ -57,6 +57,10 @@ class Reference(NamedTuple):
         """Return it as it stands before another request, even for the same set point."""
         return self._replace(target_c=math.nan)
 
+    def rests_at(self, target_c: float) -> bool:
+        """Return whether it is at `target_c` and stays there."""
+        return self == (target_c, 0.0, target_c)
+
     def after(
         self, target_c: float, most_k_per_s: float, measured_c: float, seen_s: float, pace: Pace
     ) -> Reference:

@@ -91,7 +91,8 @@ class Regulator:
         if plan.heater_check is not None:
             check = plan.heater_check
             self._watch = watch_for(check, limits.period_s, self._supervisor, self._emit)
-        self._jump_k = limits.jump_k
+        self._unknown_s = max(limits.RIDE_S, 10.0 * limits.period_s)
+        self._beliefs = Beliefs()
         self._t_s: float | None = None
         self._command = Command(0.0, -math.inf, "start")
         self._applied: float | None = None
@@ -196,7 +197,8 @@ class Regulator:
         """Return what is made of `measurement`; never raises, whatever it holds."""
         t_s, interval_s = self._time(measurement.t_s)
         load = self._load.mean(t_s, interval_s)
-        applied, commanded = self._applied_power() - load, self._commanded_power() - load
+        taken, command = self._applied_power(), self._commanded_power()
+        applied, commanded = taken - load, command - load
         verdict = self._supervisor.judge(measurement, t_s, interval_s, self._jump_k)
         temperature_c = float(measurement.temperature_c) if verdict is Verdict.GOOD else math.nan
         self._learning.observe(temperature_c, self._given(applied, interval_s), t_s)
@@ -211,9 +213,8 @@ class Regulator:
         self._steering.observe(situation)
         self._shadow.observe(situation, self._steering.mind)
         pole, holding_power = self._learning.pole(t_s), self._learning.holding_power
-        beliefs = self._steering.beliefs(situation, pole, holding_power)
-        self._jump_k = self._jump_for(beliefs)
-        weighed = attempt(self._weigh, interval_s, applied, temperature_c, beliefs.lag_s)
+        self._beliefs = beliefs = self._steering.beliefs(situation, pole, holding_power)
+        weighed = attempt(self._weigh, interval_s, applied, taken - command, temperature_c)
         if isinstance(weighed, Failure):
             self._feasibility.fail(weighed)
         ride_s = self._ride_s(situation, beliefs) if verdict is Verdict.MISSING else 0.0
@@ -267,10 +268,9 @@ class Regulator:
 
         Commands expire, so after a long gap nobody knows what was: NaN, and nothing is learnt.
         """
-        period_s = self._limits.period_s
-        known = interval_s <= max(self._limits.RIDE_S, 10.0 * period_s)
         heat = -applied if self._limits.power_cools else applied
-        return heat * interval_s / period_s if known else math.nan
+        known = interval_s <= self._unknown_s
+        return heat * interval_s / self._limits.period_s if known else math.nan
 
     def _time(self, t_s: float) -> tuple[float, float]:
         """Return the time of this step, and since the last; time that stands still goes on anyway.
@@ -287,12 +287,9 @@ class Regulator:
         self._t_s = before_s + period_s  # lost in rounding where a time is absurd, hence:
         return self._t_s, period_s
 
-    def _weigh(
-        self, interval_s: float, applied: float, temperature_c: float, lag_s: float | None
-    ) -> None:
-        """Keep the balance of heat."""
-        off = self._applied_power() - self._commanded_power()
-        beyond = off if math.isfinite(off) else 0.0
+    def _weigh(self, interval_s: float, applied: float, off: float, temperature_c: float) -> None:
+        """Keep the balance of heat; the output was `off` its command, NaN: nobody knows."""
+        beyond, lag_s = off if math.isfinite(off) else 0.0, self._beliefs.lag_s
         if self._feasibility.observe(interval_s, applied, temperature_c, lag_s, beyond):
             self._feasibility.reckon(self._wanted(), self._t_s or 0.0)
 
@@ -309,9 +306,9 @@ class Regulator:
             math.nan if self._watch is None else self._watch.ceiling_c,
         )
 
-    def _jump_for(self, beliefs: Beliefs) -> float:
-        """Return how far the next reading may lie off before it is an outlier."""
-        gain, gain_sd = beliefs.gain, beliefs.gain_sd
+    def _jump_k(self) -> float:
+        """Return how far a reading may lie off before it is an outlier."""
+        gain, gain_sd = self._beliefs.gain, self._beliefs.gain_sd
         if not is_finite_number(gain):
             return self._limits.jump_k
         sd = float(gain_sd) if is_finite_number(gain_sd) else 0.0  # type: ignore[arg-type]

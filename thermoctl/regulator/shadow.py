@@ -9,7 +9,7 @@ from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.guard import Failure, attempt
 from thermoctl.regulator.mind import Mind
 from thermoctl.regulator.supervisor import Emit
-from thermoctl.regulator.tally import Round, Tally
+from thermoctl.regulator.tally import Tally
 from thermoctl.signals import ShadowScore
 
 
@@ -75,13 +75,10 @@ class Shadow:
         mind = self._mind
         if mind is None:
             return
-        seen = attempt(mind.observe, situation)
-        of_shadow = attempt(mind.surprise_k, situation)
+        of_shadow = attempt(_surprised_k, mind, situation)
         of_charge = attempt(charge.surprise_k, situation)  # a score costs no heat
         self._surprises_k = (_number(of_charge), _number(of_shadow))
-        if isinstance(seen, Failure):
-            self._drop(seen)
-        elif isinstance(of_shadow, Failure):
+        if isinstance(of_shadow, Failure):
             self._drop(of_shadow)
 
     def decide(self, situation: Situation, given: float, seen_s: float, *, steered: bool) -> None:
@@ -108,14 +105,20 @@ class Shadow:
                 return
             if is_finite_number(asked):
                 self._power = clamp(float(asked), *self._bounds)  # type: ignore[arg-type]
-        known = self._power if steered else None
-        self._tally = self._tally.after(
-            None if known is None else Round(seen_s, given, known, *self._surprises_k)
-        )
+        if steered and self._power is not None:
+            self._tally.add(seen_s, given, self._power, *self._surprises_k)
+        else:
+            self._tally.pause()
 
     def _drop(self, failure: Failure) -> None:
         self._emit("shadow.failed", controller=self.name, text=failure.text, trace=failure.trace)
         self._mind, self._power, self._tally = None, None, Tally()
+
+
+def _surprised_k(mind: Mind, situation: Situation) -> float:
+    """Return how far the sample is from what `mind` expected of it, in K; shown to it now."""
+    mind.observe(situation)
+    return mind.surprise_k(situation)
 
 
 def _number(told: object) -> float:

@@ -30,7 +30,7 @@ from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.changeover import Changeover
 from thermoctl.regulator.judge import Judged, Verdict, farthest, judge
-from thermoctl.regulator.limits import Limits
+from thermoctl.regulator.limits import Limits, command_lasts_s
 from thermoctl.regulator.overdrawn import IN_ORDER
 from thermoctl.signals import Alarm, Command, Measurement, State
 
@@ -70,6 +70,7 @@ class Supervisor:
         self._opened_s: deque[float] = deque(maxlen=limits.OPEN_COUNT)
         self._overdrawn = IN_ORDER
         self._interval_s = limits.period_s
+        self._lasts_s = command_lasts_s(limits.period_s)  # half a period late, and a second
         self._last_power = 0.0
         self._taken = 0.0  # the last command, or what the actuators made of it
         # Heat and cold take turns only where there are both: then power goes below 0.
@@ -93,25 +94,29 @@ class Supervisor:
     # -- judging ---------------------------------------------------------------------------------
 
     def judge(
-        self, measurement: Measurement, t_s: float, interval_s: float, jump_k: float | None = None
+        self,
+        measurement: Measurement,
+        t_s: float,
+        interval_s: float,
+        jump_k: Callable[[], float] | None = None,
     ) -> Verdict:
         """Return what `measurement`, `interval_s` after the last, is worth.
 
-        `jump_k` is the jump that the plant could make, that of the limits when not given.
+        `jump_k` returns the jump that the plant could make, that of the limits when not given.
         """
         before = self._judged.verdict
-        self._judged = judge(self._judged, measurement, self.limits, jump_k)
+        self._judged = judged = judge(self._judged, measurement, self.limits, jump_k)
         self._measurement = measurement
         self._interval_s = interval_s
         self.seen_s = seen_s = self.limits.seen_s(interval_s)
-        verdict = self._judged.verdict
+        verdict = judged.verdict
         if verdict is Verdict.GOOD:
             self._good_s += seen_s if before is Verdict.GOOD else 0.0
-            self._blind_s = max(0.0, self._blind_s - seen_s)
-        else:
-            forgiven = self._forsaken and verdict is Verdict.MISSING
-            self._good_s = max(0.0, self._good_s - interval_s) if forgiven else 0.0
-            self._blind_s += interval_s
+            self._blind_s = max(0.0, self._blind_s - seen_s) if self._blind_s else 0.0
+            return verdict
+        forgiven = self._forsaken and verdict is Verdict.MISSING
+        self._good_s = max(0.0, self._good_s - interval_s) if forgiven else 0.0
+        self._blind_s += interval_s
         if verdict is Verdict.SPIKE:
             ignored = self._judged.outliers
             self._emit("sensor.spike", temperature_c=measurement.temperature_c, ignored=ignored)
@@ -172,6 +177,8 @@ class Supervisor:
                 self.alarms.clear(code)
             if self._blind_s == 0.0:
                 self.alarms.clear("sensor.missing")
+        if self.state is State.RUN:  # nearly always
+            return
         if self.state in (State.RIDE, State.HOLD):
             self._enter(State.RUN, "sensor.good")
         elif self.state is State.SAFE and settled:
@@ -252,7 +259,7 @@ class Supervisor:
         else:
             power, reason = self._limited(float(asked), reason)  # type: ignore[arg-type]
         self._last_power = self._taken = power
-        return Command(power, self.limits.valid_until_s(t_s), reason)
+        return Command(power, t_s + self._lasts_s, reason)
 
     @property
     def last_power(self) -> float:

@@ -7,6 +7,8 @@ is ever counted down, and none can drift, however long a loop runs.
 from __future__ import annotations
 
 import math
+from collections import deque
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from thermoctl.signals import ShadowScore
@@ -15,82 +17,84 @@ ROW_S = 60.0
 ROWS = 10
 
 
-class Round(NamedTuple):
-    """One sample: how long it stands, both powers, both surprises in K or NaN."""
-
-    seen_s: float
-    given: float
-    shadow: float
-    surprise_k: float
-    shadow_surprise_k: float
-
-
 class Sums(NamedTuple):
     """What is added up over a row of samples; surprises as squares, and their number."""
 
-    span_s: float = 0.0
-    apart_s: float = 0.0
-    travel: float = 0.0
-    shadow_travel: float = 0.0
-    squares: float = 0.0
-    samples: float = 0.0
-    shadow_squares: float = 0.0
-    shadow_samples: float = 0.0
+    span_s: float
+    apart_s: float
+    travel: float
+    shadow_travel: float
+    squares: float
+    samples: float
+    shadow_squares: float
+    shadow_samples: float
 
 
-NONE = Sums()
-
-
-class Tally(NamedTuple):
+class Tally:
     """Rows of sums, the last of them still open.
 
-    Parameters
+    Attributes
     ----------
-    rows : tuple of Sums
-        Complete ones, oldest first, at most `ROWS`.
-    current : Sums
-        The row that is being filled.
-    before : Round or None
-        The sample before, None after a break: travel is counted between neighbours alone.
     score : ShadowScore or None
-        Over `rows`; None while there is none.
+        Over the last complete rows, at most `ROWS`; None while there is none.
     """
 
-    rows: tuple[Sums, ...] = ()
-    current: Sums = NONE
-    before: Round | None = None
-    score: ShadowScore | None = None
+    def __init__(self) -> None:
+        self.score: ShadowScore | None = None
+        self._rows: deque[Sums] = deque(maxlen=ROWS)
+        self._given = self._shadow = math.nan  # of the sample before
+        self._open_row()
 
-    def after(self, played: Round | None) -> Tally:
-        """Return the tally after one more sample; None for one that does not count."""
-        if played is None:
-            return self if self.before is None else Tally(self.rows, self.current, None, self.score)
-        sums = _with(self.current, played, self.before)
-        if sums.span_s < ROW_S:
-            return Tally(self.rows, sums, played, self.score)
-        rows = (*self.rows, sums)[-ROWS:]
-        return Tally(rows, NONE, played, _score(rows))
+    def _open_row(self) -> None:
+        self._span_s = self._apart_s = self._travel = self._shadow_travel = 0.0
+        self._squares = self._samples = self._shadow_squares = self._shadow_samples = 0.0
+
+    def pause(self) -> None:
+        """Leave a sample out: travel is that between neighbours alone."""
+        self._given = self._shadow = math.nan
+
+    def add(
+        self,
+        seen_s: float,
+        given: float,
+        shadow: float,
+        surprise_k: float,
+        shadow_surprise_k: float,
+    ) -> None:
+        """Add a sample: how long it stands, both powers, both surprises in K or NaN."""
+        self._span_s += seen_s
+        self._apart_s += abs(given - shadow) * seen_s
+        if self._given == self._given:  # nearly always, and faster than to ask for NaN
+            self._travel += abs(given - self._given)
+            self._shadow_travel += abs(shadow - self._shadow)
+        self._given, self._shadow = given, shadow
+        if math.isfinite(surprise_k):
+            self._squares += surprise_k * surprise_k
+            self._samples += 1.0
+        if math.isfinite(shadow_surprise_k):
+            self._shadow_squares += shadow_surprise_k * shadow_surprise_k
+            self._shadow_samples += 1.0
+        if self._span_s >= ROW_S:
+            self._close_row()
+
+    def _close_row(self) -> None:
+        self._rows.append(
+            Sums(
+                self._span_s,
+                self._apart_s,
+                self._travel,
+                self._shadow_travel,
+                self._squares,
+                self._samples,
+                self._shadow_squares,
+                self._shadow_samples,
+            )
+        )
+        self._open_row()
+        self.score = _score(self._rows)
 
 
-def _with(sums: Sums, played: Round, before: Round | None) -> Sums:
-    """Return `sums` with one sample more; by unpacking, since looking up names takes longer."""
-    span_s, apart_s, travel, shadow_travel, squares, samples, shadow_squares, shadow_samples = sums
-    seen_s, given, shadow, e, shadow_e = played
-    _, given_before, shadow_before, _, _ = played if before is None else before
-    known, shadow_known = math.isfinite(e), math.isfinite(shadow_e)
-    return Sums(
-        span_s + seen_s,
-        apart_s + abs(given - shadow) * seen_s,
-        travel + abs(given - given_before),
-        shadow_travel + abs(shadow - shadow_before),
-        squares + (e * e if known else 0.0),
-        samples + known,
-        shadow_squares + (shadow_e * shadow_e if shadow_known else 0.0),
-        shadow_samples + shadow_known,
-    )
-
-
-def _score(rows: tuple[Sums, ...]) -> ShadowScore:
+def _score(rows: Iterable[Sums]) -> ShadowScore:
     """Return the score of complete rows."""
     whole = Sums(*map(math.fsum, zip(*rows, strict=True)))
     per_min = 60.0 / whole.span_s

@@ -85,10 +85,11 @@ class Wishes:
 
     def approach(self, measured_c: float, seen_s: float, state: State) -> Reference:
         """Return what is followed at this sample, on the way to the set point."""
+        target_c, most_k_per_s = self.setpoint_c, self.rate_k_per_s
+        if most_k_per_s == math.inf and self.reference.rests_at(target_c):
+            return self.reference
         pace = pace_in(self.mode, state)
-        self.reference = self.reference.after(
-            self.setpoint_c, self.rate_k_per_s, measured_c, seen_s, pace
-        )
+        self.reference = self.reference.after(target_c, most_k_per_s, measured_c, seen_s, pace)
         return self.reference
 
     def follow(self, setpoint_c: float) -> None:
