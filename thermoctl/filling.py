@@ -17,7 +17,7 @@ def quickly_filled(cls: type[T]) -> type[T]:
     """Return the frozen dataclass `cls`, whose constructor now assigns its fields.
 
     While it does, the instance belongs to an open twin of `cls`, of which nobody knows; what the
-    constructor returns is as frozen as before. It is worth it from some four fields on.
+    constructor returns is as frozen as before. It is worth it from some three fields on.
 
     Raises
     ------

@@ -164,6 +164,7 @@ class PlantBelief:
     jumped: bool
 
 
+@quickly_filled
 @dataclass(frozen=True, slots=True)
 class Feasible:
     """What is said of a set point before it is reached; NaN where not known.
@@ -219,6 +220,7 @@ class ShadowScore:
     shadow_surprise_k: float | None = None
 
 
+@quickly_filled
 @dataclass(frozen=True, slots=True)
 class Command:
     """A power that expires: without a fresh command the output falls to zero.

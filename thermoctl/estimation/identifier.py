@@ -11,12 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from thermoctl.estimation.belief import frozen, scalar, start
+from thermoctl.filling import quickly_filled
 from thermoctl.model.arx import Structure
 from thermoctl.ports import Estimator
 from thermoctl.quantities import Array
 from thermoctl.signals import Estimate
 
 
+@quickly_filled
 @dataclass(frozen=True, slots=True, eq=False)
 class IdentifierBelief:
     """An estimate and the past of its next regressor; arrays read-only.
