@@ -38,7 +38,8 @@ class Inexact(NamedTuple):
         off = situation.applied - situation.commanded
         if off == 0.0 == more and pulses_s == 0.0:  # nearly always
             return self
-        pulses_s = max(pulses_s - situation.interval_s, 0.0)
+        if pulses_s > 0.0:
+            pulses_s = max(pulses_s - situation.interval_s, 0.0)
         if abs(situation.applied) > abs(situation.commanded) + INEXACT:
             return Inexact(more, PULSES_S)
         if pulses_s > 0.0 and situation.applied == 0.0:

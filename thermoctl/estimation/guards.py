@@ -17,7 +17,7 @@ from thermoctl.estimation.belief import LARGEST, frozen, positive, scalar, truth
 from thermoctl.estimation.kalman import CorrectedKalman, RandomWalkKalman
 from thermoctl.estimation.least_squares import RecursiveLeastSquares
 from thermoctl.estimation.recursion import RecursiveLaw, regressor
-from thermoctl.estimation.stack import Stacked, stack
+from thermoctl.estimation.stack import Stacked, stack, stacked_one
 from thermoctl.filling import quickly_filled
 from thermoctl.quantities import Array, clamp
 from thermoctl.signals import Estimate
@@ -159,13 +159,12 @@ class Guarded:
         most = self.covariance_max
         if most is None:
             return rows
+        if rows.size == 2:  # one parameter, as in most models
+            return rows if rows.item(1) <= most else stacked_one(rows.item(0), most)
         variances = rows[1:].diagonal()
         if max(variances.tolist()) <= most:
             return rows
         bounded = rows.copy()
-        if len(variances) == 1:  # most models, and at rest at every sample
-            bounded[1, 0] = most
-            return frozen(bounded)
         d = np.sqrt(most / np.maximum(variances, most))
         bounded[1:] *= np.multiply.outer(d, d)
         return frozen(bounded)
@@ -178,8 +177,8 @@ class Guarded:
         assert isinstance(law, _WITH_R2)
         sd = NORMAL_SD * memory.ranked[len(memory.ranked) // 2]
         least = R2_FLOOR * law.R2 if self.R2_min is None else self.R2_min
-        R2 = clamp(max(sd * sd, least), 1.0 / LARGEST, LARGEST)
-        return law if R2 == law.R2 else replace(law, R2=R2)
+        R2 = max(sd * sd, least)
+        return law if R2 == law.R2 else replace(law, R2=clamp(R2, 1.0 / LARGEST, LARGEST))
 
     def _remembered(self, memory: _Memory | None, rows: Array, phi: Array, y: float) -> _Memory:
         """Return the memory after a usable sample; it begins with the stack `rows`."""

@@ -36,7 +36,7 @@ from thermoctl.estimation.belief import (
     scalar,
     shown,
 )
-from thermoctl.estimation.stack import Learned, LearnedOne, stack, unstacked
+from thermoctl.estimation.stack import Learned, LearnedOne, stack, stacked_one, unstacked
 from thermoctl.quantities import Array, is_finite_number
 from thermoctl.signals import Estimate
 
@@ -121,7 +121,10 @@ class RecursiveLaw(ABC):
             raise ValueError(f"phi must have shape {rows.shape[1:]}, got {phi.shape}")
         if phi.shape == (1,):
             one = self.learn_one(rows.item(0), rows.item(1), phi.item(), y)
-            return None if one is None else _stacked(*one)
+            if one is None:
+                return None
+            theta, variance, e, S, inflation = one
+            return stacked_one(theta, variance), e, S, inflation
         # Plain floats add up without a warning; the comparison is false for NaN. Once phi, and
         # below e, are known to be sane, nothing here can overflow.
         if not sum(map(abs, phi.tolist())) < LARGEST:
@@ -154,25 +157,21 @@ class RecursiveLaw(ABC):
         if not abs(phi) < LARGEST:
             return None
         e, g = y - theta * phi, P * phi
-        q = max(g * phi, 0.0)
+        q = g * phi
+        if q < 0.0:
+            q = 0.0
         S, inflation = self.weigh(q, e, 1, NUMBERS)
         if not e * e < LARGEST * S < math.inf:
             return None
-        w = g / math.sqrt(S)
-        theta += e / math.sqrt(S) * w  # O21 (18), (19)
+        root = math.sqrt(S)
+        w = g / root
+        theta += e / root * w  # O21 (18), (19)
         P = (P - w * w) * inflation  # O21 (21), and (25) or (13)
         R1 = self.R1
         P += drift(R1, 1).item() if isinstance(R1, np.ndarray) else R1  # O21 (20)
         if not theta * theta + P * P < LARGEST * LARGEST:
             return None
         return theta, P, e, S, inflation
-
-
-def _stacked(theta: float, P: float, e: float, S: float, inflation: float) -> Learned:
-    """Return what was learnt of one parameter as a stack."""
-    rows = np.empty((2, 1))
-    rows[0, 0], rows[1, 0] = theta, P
-    return frozen(rows), e, S, inflation
 
 
 def regressor(phi: npt.ArrayLike) -> Array:

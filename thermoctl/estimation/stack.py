@@ -54,6 +54,14 @@ def stack(belief: Estimate) -> Array:
     return rows
 
 
+def stacked_one(theta: float, P: float) -> Array:
+    """Return the stack of one parameter, read-only."""
+    rows = np.empty((2, 1))
+    rows[0, 0], rows[1, 0] = theta, P
+    rows.setflags(write=False)
+    return rows
+
+
 def unstacked(learned: Learned) -> Stacked:
     """Return the estimate that lies in what was `learned`."""
     rows, innovation, innovation_var, inflation = learned

@@ -191,7 +191,7 @@ class KnownGain:
 
     def regressor(self, y_past_c: Array, u_past: Array) -> Array:
         """Return phi(t) = (y(t-1),) in degC; `u_past` is not used."""
-        return y_past_c[:1]
+        return y_past_c if len(y_past_c) == 1 else y_past_c[:1]  # nearly always all of it
 
     def target(self, temperature_c: float, u_past: Array) -> float:
         """Return y(t) - b u(t-1) in degC."""

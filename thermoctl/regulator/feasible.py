@@ -183,10 +183,12 @@ class Feasibility:
             return False
         if lag_s is not None and lag_s > 0.0:
             self._lag_s = lag_s
-        warming = max(applied, 0.0)  # a cooler beside the heater has a gain of its own
+        # A cooler beside the heater has a gain of its own.
+        warming = applied if applied > 0.0 else 0.0
         share = -math.expm1(-interval_s / self._lag_s)
         self._heat += share * (warming - self._heat)
-        self._asked += share * (min(warming, applied - beyond) - self._asked)
+        asked = applied - beyond
+        self._asked += share * ((asked if asked < warming else warming) - self._asked)
         heat, seen = self._heat, reading_c == reading_c
         if seen:
             self._reading_c = reading_c

@@ -15,7 +15,7 @@ from thermoctl.ports import Remembered, Remembering
 from thermoctl.regulator.guard import Failure, attempt
 from thermoctl.regulator.heater import memory as heater_memory
 from thermoctl.regulator.heater.response import Gain
-from thermoctl.regulator.heater.sides import Watch, named
+from thermoctl.regulator.heater.sides import Named, Watch, named
 from thermoctl.regulator.mind import Mind
 from thermoctl.regulator.supervisor import Emit
 
@@ -58,14 +58,14 @@ def origin(mind: Mind) -> str | None:
     return told if isinstance(told, str) else None
 
 
-def remembering(minds: Iterable[Mind | None], watch: Watch | None) -> Callable[[], Models]:
-    """Return a function that says what `minds` and `watch` would like kept now."""
+def remembering(minds: Iterable[Mind | None], watches: Named) -> Callable[[], Models]:
+    """Return a function that says what `minds` and `watches` would like kept now."""
     held = [
         (mind.name, mind.remembers, mind.belief)
         for mind in minds
         if mind is not None and mind.remembers is not None
     ]
-    return partial(_remembered, held, [(name, each.known) for name, each in named(watch).items()])
+    return partial(_remembered, held, [(name, each.known) for name, each in watches.items()])
 
 
 def _remembered(

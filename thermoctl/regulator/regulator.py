@@ -15,7 +15,7 @@ from thermoctl.quantities import clamp, is_finite_number
 from thermoctl.regulator.feasible import Wanted
 from thermoctl.regulator.feasible_sides import balance_for
 from thermoctl.regulator.guard import Failure, Guard, attempt
-from thermoctl.regulator.heater.sides import Watch, watch_for
+from thermoctl.regulator.heater.sides import Watch, named, watch_for
 from thermoctl.regulator.judge import Verdict
 from thermoctl.regulator.learning import Learning
 from thermoctl.regulator.load import KnownLoad
@@ -91,6 +91,7 @@ class Regulator:
         if plan.heater_check is not None:
             check = plan.heater_check
             self._watch = watch_for(check, limits.period_s, self._supervisor, self._emit)
+        self._watches = named(self._watch)
         self._unknown_s = max(limits.RIDE_S, 10.0 * limits.period_s)
         self._beliefs = Beliefs()
         self._t_s: float | None = None
@@ -234,9 +235,9 @@ class Regulator:
         self._learning.kept_s = kept_s
         known = is_finite_number(power)
         taken = float(power) if known else math.nan
-        self._supervisor.check_applied(self._command.power, taken, self._t_s or 0.0)
+        possible = self._supervisor.check_applied(self._command.power, taken, self._t_s or 0.0)
         if known:
-            self._applied = self._limits.possible(taken)
+            self._applied = possible
 
     def fault(self, code: str, fault: int | None, text: str) -> None:
         """Report that something outside failed: SAFE from the next step on.
@@ -383,7 +384,7 @@ class Regulator:
             load,
             self._steering.tell(self._shadow.mind),
             origin(self._steering.mind),
-            remembering((self._steering.mind, self._shadow.mind), self._watch),
+            remembering((self._steering.mind, self._shadow.mind), self._watches),
         )
 
     def _emit(self, name: str, **fields: object) -> None:

@@ -285,8 +285,8 @@ class Supervisor:
         rows = self.alarms.rows()
         return next((row.code for row in rows if row.latched or row.active), self.state.value)
 
-    def check_applied(self, commanded: float, applied: float, t_s: float) -> None:
-        """Compare what was taken with the command: more, twice in a row, is a fault.
+    def check_applied(self, commanded: float, applied: float, t_s: float) -> float:
+        """Return what was taken; more than the command, twice in a row, is a fault.
 
         More of either: a cooler that is on while the heater was asked for is no less a fault. An
         output that may be late has its window first; one that does not say what it took has none.
@@ -302,6 +302,7 @@ class Supervisor:
             beyond = math.inf
         if beyond > 0.0 or self._overdrawn is not IN_ORDER:
             self._charge(beyond, window_s, commanded, applied, t_s)
+        return self._taken
 
     def _charge(
         self, beyond: float, window_s: float, commanded: float, applied: float, t_s: float

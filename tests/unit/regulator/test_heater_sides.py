@@ -149,7 +149,7 @@ def test_one_watch_is_enough_for_one_actuator():
 
 def test_what_either_has_learnt_is_kept_under_a_name_of_its_own():
     tank = known()
-    kept = remembering((), tank.watch)()
+    kept = remembering((), named(tank.watch))()
     assert set(kept) == {"heater-check", "cooler-check"}
     again = Tank()
 

@@ -95,7 +95,10 @@ def watch_for(check: HeaterCheck, period_s: float, supervisor: Reacts, emit: Emi
     return kind(check, period_s, supervisor, emit)
 
 
-def named(watch: Watch | None) -> Mapping[str, HeaterWatch | LedWatch]:
+Named = Mapping[str, HeaterWatch | LedWatch]
+
+
+def named(watch: Watch | None) -> Named:
     """Return every watch by the name under which it remembers what it knows."""
     if isinstance(watch, Sides):
         return {memory.NAME: watch.heater, memory.COOLER_NAME: watch.cooler}
