@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import BaseModel, Field, SerializeAsAny, ValidationError
 
 from thermoctl.app import plugins
-from thermoctl.app.cascades import cascade_errors
+from thermoctl.app.cascades import as_blocks, cascade_errors
 from thermoctl.app.configuration.document import (
     BadConfiguration,
     Document,
@@ -117,7 +117,7 @@ class _Reading:
             tables[key] = self._table(model, content.get(key, {}), (key,))
         if self._problems:
             raise BadConfiguration(self._problems)
-        return Settings.model_validate(tables)
+        return Settings.model_validate({**tables, "loops": as_blocks(tables["loops"])})
 
     def _boards(self) -> dict[str, BaseModel | None]:
         """Return each board's settings by the model of its kind."""

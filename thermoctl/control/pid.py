@@ -186,7 +186,8 @@ class Pid:
         terms = law.see(before, situation.temperature_c, interval_s)
         known = math.isfinite(before.seen_c) and math.isfinite(setpoint_c)
         if known and math.isfinite(before.asked) and interval_s < law.gains.integral_s:
-            terms = law.integrate(terms, setpoint_c, left, interval_s)
+            keeps = situation.kept_s > 0.0
+            terms = law.integrate(terms, setpoint_c, left, interval_s, keeps=keeps)
         elif known:
             terms = law.track(terms, setpoint_c, left)
         return PidBelief(replace(terms, asked=math.nan), tuning, belief.kept, ahead_s)

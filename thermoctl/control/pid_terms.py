@@ -85,16 +85,24 @@ class PidTerms:
         return terms.integral - self._offset(setpoint_c)
 
     def integrate(
-        self, terms: Terms, setpoint_c: float, applied: float, interval_s: float
+        self,
+        terms: Terms,
+        setpoint_c: float,
+        applied: float,
+        interval_s: float,
+        *,
+        keeps: bool = False,
     ) -> Terms:
         """Return the terms after `interval_s` in charge, in which `applied` was given.
 
         What the plant was given is what counts. Where it was less than asked for, an integral that
         would hold more than that relaxes onto it, and a positive error is integrated no further
         than to where the integral holds nothing; at the lower end likewise upside down. No limit
-        gives more than was asked for: then somebody else steers, as beside a law in shadow.
+        gives more than was asked for: then somebody else steers, as beside a law in shadow. Nor is
+        that so where what acts `keeps` its heat: a block that cools down gives more than it is
+        asked for, and a law that followed it would ask it to stay as hot as it is.
         """
-        if applied > max(terms.asked, 0.0) + TOLERANCE:
+        if applied > max(terms.asked, 0.0) + TOLERANCE and not keeps:
             return self.track(terms, setpoint_c, applied)
         gains, offset = self.gains, self._offset(setpoint_c)
         holding = terms.integral - offset

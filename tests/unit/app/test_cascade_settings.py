@@ -11,6 +11,7 @@ from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
 from thermoctl.app.sim import bench_settings
 from thermoctl.app.tuning.trial import alone
+from thermoctl.control.adaptive.constants import Lags
 from thermoctl.errors import ConfigError
 from thermoctl.runtime.clock import SimulatedClock
 
@@ -98,3 +99,23 @@ def test_a_cascade_on_real_boards_has_no_stand_in():
     document["boards"]["daq"] = {"kind": "thermodaq", "port": "/dev/null"}
     with pytest.raises(ConfigError, match="needs simulated boards"):
         bench_settings(load(document))
+
+
+def test_an_adaptive_loop_that_follows_may_be_as_quick_as_a_block():
+    document = cascade()
+    document["loops"]["block"]["controller"] = {"kind": "adaptive"}
+    del document["loops"]["block"]["jump_k"]
+    loops = load(document).loops
+    assert plan_for(loops["block"]).limits.jump_for(0.1, 0.0) == 25.0
+    assert plan_for(loops["block"]).controller.lags == Lags(1.0, 60.0)
+    assert plan_for(loops["bath"]).controller.lags == Lags()
+    assert load(load(document).in_force()) == load(document)
+
+
+def test_what_is_configured_of_a_follower_stays():
+    document = cascade()
+    lags = {"shortest_s": 2.0}
+    document["loops"]["block"]["shadow"] = {"kind": "adaptive", "lags": lags}
+    plan = plan_for(load(document).loops["block"])
+    assert plan.shadow.lags == Lags(2.0)
+    assert plan.limits.jump_for(0.1, 0.0) == 12.0

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from thermoctl.control.pid import Pid
+from thermoctl.control.pid_terms import PidTerms, Terms
+from thermoctl.control.simc import Gains
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
 from thermoctl.signals import Beliefs
@@ -271,3 +273,11 @@ def test_it_believes_nothing_remarks_nothing_and_does_not_ride():
 def test_a_constructor_names_the_argument_that_is_wrong(name, value):
     with pytest.raises(ValueError, match=name):
         replace(Pid(), **{name: value})
+
+
+@pytest.mark.parametrize(("keeps", "least", "most"), [(True, 0.09, 0.12), (False, 0.8, 0.8)])
+def test_a_block_that_cools_down_is_no_other_law_that_steers(keeps, least, most):
+    law = PidTerms(Gains(0.1, 100.0))
+    terms = replace(law.at_rest(law.see(Terms(), 41.0, 1.0), 40.0, 0.2), asked=0.1)
+    after = law.integrate(terms, 40.0, 0.8, 1.0, keeps=keeps)
+    assert least - 1e-9 <= law.power(after, 40.0) <= most + 1e-9

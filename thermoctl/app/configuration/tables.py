@@ -284,7 +284,7 @@ class LoopTable(Table):
         1.0,
         description="A reading farther off than this may be an outlier; left out, it is at least "
         "twice the rise in a period at full power, with the gain that is configured or the largest "
-        "that the controller believes in.",
+        "that the controller believes in; and 25 for a loop that follows another one.",
     )
     sensor: SensorTable | None = None
     second_sensor: SensorTable | None = Field(

@@ -50,6 +50,9 @@ COOLS_S, COOLS_MOST = 100.0, 1.0 / 30.0
 """and is expected to be about one part in so many seconds, if any, and no more than the second."""
 JUMP_K, JUMP_SDS, JUMP_GAINS = 0.5, 10.0, 3.0
 """A reading that moves by more in a block than these is no drift: somebody poured."""
+STORED_K = 60.0
+"""No heater has more under way, in K. A block that gives its heat away within seconds follows its
+power, and so does what a long lag makes of ten times the gain, for the few minutes of a warm-up."""
 MIXES_S = 100.0
 """So long after that nothing is learnt: what was poured is still being mixed, and the rebound of
 the reading would pass for a heater of thirty times the gain."""
@@ -301,6 +304,10 @@ class HeatResponse:
         products, plain, cooling = total.products, [], []
         for path in paths:
             squares, along = path.squares, path.along
+            if 2.0 * path.pole_s * path.products > STORED_K * squares:
+                plain.append(0.0)
+                cooling.append(0.0)
+                continue
             alone = path.products * path.products / squares
             rest = along * path.products - squares * products
             plain.append(alone)
