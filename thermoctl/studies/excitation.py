@@ -122,7 +122,9 @@ class Excitation:
             times.append(times[-1] + math.exp(random.uniform(low, high)))
         return tuple(times[1:])
 
-    def after(self, course: Course, t_s: float, temperature_c: float) -> tuple[Course, float]:
+    def after(
+        self, course: Course, t_s: float, temperature_c: float, under_way_k: float = 0.0
+    ) -> tuple[Course, float]:
         """Return how far the signal has come, and the power for the next period.
 
         Parameters
@@ -133,20 +135,24 @@ class Excitation:
             Time of the reading, in s.
         temperature_c : float
             The reading, in degC; NaN where there is none: the power is low then.
+        under_way_k : float
+            By how much heat that was given will still raise it, in K, as far as anybody knows.
         """
         if not math.isfinite(temperature_c):
             return course, self.low
+        coming_c = temperature_c + max(under_way_k, 0.0)
+        at_top = coming_c >= self.top_c - self.early_k
         if course.approaching:
-            if temperature_c < self.middle_c:
+            if temperature_c < self.middle_c and not at_top:
                 return course, self.high
             course = Course(t_s)
         forced = course.forced
-        if temperature_c >= self.top_c - self.early_k:
+        if at_top:
             forced = self.low
-        elif temperature_c <= self.bottom_c:
+        elif coming_c <= self.bottom_c:
             forced = self.high
-        elif (forced == self.low and temperature_c <= self.middle_c) or (
-            forced == self.high and temperature_c >= self.middle_c
+        elif (forced == self.low and coming_c <= self.middle_c) or (
+            forced == self.high and coming_c >= self.middle_c
         ):
             forced = None
         switches = bisect_right(self.switches_s, t_s - course.begun_s)

@@ -51,6 +51,26 @@ def test_below_the_band_the_power_is_high_whatever_the_signal_says():
     assert set(powers(PLAN, [36.0] + [34.9] * 1200)[1:]) == {0.8}
 
 
+def test_what_is_under_way_ends_the_approach_before_the_middle():
+    course, power = PLAN.after(Course(), 0.0, 35.0, 1.9)
+    assert (course.approaching, power) == (True, 0.8)
+    course, power = PLAN.after(course, 1.0, 35.1, 1.9)
+    assert (course.approaching, power) == (False, 0.1)
+
+
+def test_what_is_under_way_counts_as_if_it_had_arrived():
+    course, power = PLAN.after(Course(0.0, 0.8), 1.0, 35.2, 1.8)
+    assert power == 0.1
+    course, power = PLAN.after(course, 2.0, 35.9, 0.5)  # colder than the middle, and yet to rise
+    assert (course.forced, power) == (0.1, 0.1)
+    course, _ = PLAN.after(course, 3.0, 35.9, 0.1)
+    assert course.forced is None
+
+
+def test_what_is_said_to_cool_is_not_relied_on():
+    assert PLAN.after(Course(0.0), 1.0, 36.97, -1.0) == PLAN.after(Course(0.0), 1.0, 36.97)
+
+
 def test_after_an_edge_the_signal_waits_for_the_middle():
     at_last = next(t for t in range(1200) if powers(PLAN, [36.0] * 1200)[t] == 0.8)
     down = [36.0] * (at_last - 1) + [37.0, 36.9, 36.5, 36.1]

@@ -232,7 +232,8 @@ def _consent(settings: Settings, name: str, excitation: Excitation, asked: _Aske
     click.echo(
         f"Loop {name} will heat through board {board}{f' at {place}' if place else ''}:"
         f" {100 * excitation.low:g} and {100 * excitation.high:g} % of full power, up to"
-        f" {excitation.top_c:g} degC, for at most {duration(excitation.duration_s)}.",
+        f" {excitation.top_c:g} degC, and past it only by heat that is under way by then,"
+        f" for at most {duration(excitation.duration_s)}.",
         err=True,
     )
     if not click.confirm("Begin?", err=True):

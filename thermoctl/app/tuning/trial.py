@@ -16,7 +16,7 @@ from thermoctl.app.settings import Settings
 from thermoctl.errors import ConfigError
 from thermoctl.ports import Clock
 from thermoctl.runtime.loop import Loop, Publish
-from thermoctl.signals import Cycle, ManualPower, Mode, Quality, State
+from thermoctl.signals import Cycle, ManualPower, Mode, Quality, State, Step
 from thermoctl.studies.excitation import Course, Excitation
 from thermoctl.studies.record import Collector, Columns
 
@@ -135,6 +135,13 @@ def alone(settings: Settings, name: str) -> Settings:
     return started_as(single, {name: (Mode.MANUAL, table.setpoint_c)})
 
 
+def _under_way_k(step: Step) -> float:
+    """Return by how much heat that was given will still raise the reading, as far as is known."""
+    plant = step.plant
+    coming_k = 0.0 if plant is None else plant.coasting_c - step.measurement.temperature_c
+    return max(coming_k, 0.0) if math.isfinite(coming_k) else 0.0
+
+
 class Trial:
     """One run of a loop through a test signal.
 
@@ -217,7 +224,9 @@ class Trial:
         elif elapsed_s >= self._excitation.duration_s:
             self._end(Ending.FINISHED)
         else:
-            self._course, power = self._excitation.after(self._course, step.t_s, temperature_c)
+            self._course, power = self._excitation.after(
+                self._course, step.t_s, temperature_c, _under_way_k(step)
+            )
             self.loop.ask(ManualPower(power), self._name)
         self._watch(cycle, min(1.0, elapsed_s / self._excitation.duration_s))
 

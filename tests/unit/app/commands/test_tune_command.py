@@ -7,15 +7,18 @@ import os
 import signal
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 
 from thermoctl.app.cli import cli
+from thermoctl.app.commands import tune as tune_module
 from thermoctl.app.commands.endings import exit_code_of, words_of
 from thermoctl.app.commands.tune import tune_command
 from thermoctl.app.configuration.suggestion import limit_keys
 from thermoctl.app.settings import load
+from thermoctl.app.tuning.trial import plan
 from thermoctl.services.lock import DaemonLock
 from thermoctl.services.store import Latch, LatchStore
 from thermoctl.studies import figure as house
@@ -315,3 +318,12 @@ def test_a_loop_that_cannot_be_heated_to_a_band_is_refused(profile, told):
     assert (code, out) == (2, "")
     assert told in said
     assert not Path("tune").exists()
+
+
+def test_the_question_names_the_heat_that_may_pass_the_limit(capsys, monkeypatch):
+    monkeypatch.setattr("thermoctl.app.commands.tune.click.confirm", lambda *_, **__: True)
+    settings = load(tomllib.loads(BOARD))
+    asked = SimpleNamespace(yes=False)
+    tune_module._consent(settings, "tank", plan(settings, "tank", None, 2.0, 1200.0), asked)
+    said = capsys.readouterr().err
+    assert "up to 37.5 degC, and past it only by heat that is under way by then, for at" in said

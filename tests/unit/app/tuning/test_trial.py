@@ -7,7 +7,7 @@ import pytest
 
 from thermoctl.app.compose import loop_for, regulator_for
 from thermoctl.app.settings import load
-from thermoctl.app.sim import bench_settings
+from thermoctl.app.sim import bench_settings, default_profile
 from thermoctl.app.tuning.trial import Ending, Trial, alone, plan
 from thermoctl.errors import ConfigError, LinkError, TransientError
 from thermoctl.model.actuator import Linear
@@ -239,6 +239,18 @@ def test_the_band_is_passed_by_no_more_than_the_element_holds(seed, band_k):
     assert outcome.hottest_c == pytest.approx(max(true_c), abs=0.15)
     reached = next(t for t, each in enumerate(true_c) if each > 37.5 - band_k)
     assert min(true_c[reached:]) > 37.5 - band_k - 0.5
+
+
+@pytest.mark.parametrize(("volume_l", "heater_w"), [(1.0, 600.0), (8.0, 1500.0)])
+def test_heat_that_the_controller_knows_to_be_under_way_stays_within_the_band(volume_l, heater_w):
+    settings = bench_settings(default_profile(), 1)
+    board = settings.boards["daq"].model_copy(update={"volume_l": volume_l, "heater_w": heater_w})
+    trial, cycles = simulated(source=settings.model_copy(update={"boards": {"daq": board}}))
+    trial.run()
+    true_c = [cycle.truth["true_temperature_c"] for cycle in cycles]
+    assert 37.0 < max(true_c) < 37.5  # without, the litre comes to 39 degC
+    power = trial.record.finish().u
+    assert sum(abs(b - a) > 0.5 for a, b in pairwise(power)) >= 12
 
 
 def test_both_powers_are_given_again_and_again_within_the_band():
