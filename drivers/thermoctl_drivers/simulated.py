@@ -133,10 +133,9 @@ class SimulatedBoard:
 
     def __init__(self, settings: SimulatedSettings, link: Link | None, clock: Clock) -> None:
         del link  # every driver is built alike; this one has nothing to talk to
-        rngs = np.random.default_rng(settings.seed).spawn(5)
-        tank_rng, specimen_rng, input_rng, element_rng, second_rng = rngs
+        tank_rng, _, input_rng, element_rng, second_rng = _generators(settings)
         try:
-            parameters = specimen(_tank_parameters(settings), specimen_rng, settings.tolerances)
+            parameters = tank_parameters(settings)
             acquisition = _acquisition_parameters(settings)
         except ValueError as error:
             raise BoardConfigError(str(error)) from error
@@ -311,8 +310,18 @@ class SimulatedBoard:
         self._now_s = now_s
 
 
-def _tank_parameters(settings: SimulatedSettings) -> TankParameters:
-    """Return the tank that was ordered; raise ValueError where its parts do not fit."""
+def _generators(settings: SimulatedSettings) -> list[np.random.Generator]:
+    """Return those of the tank, of its specimen, and of the three inputs."""
+    return np.random.default_rng(settings.seed).spawn(5)
+
+
+def tank_parameters(settings: SimulatedSettings) -> TankParameters:
+    """Return the tank that was built; raise ValueError where its parts do not fit."""
+    return specimen(_ordered(settings), _generators(settings)[1], settings.tolerances)
+
+
+def _ordered(settings: SimulatedSettings) -> TankParameters:
+    """Return the tank that was ordered."""
     scaled = TankParameters.scaled(
         settings.volume_l,
         settings.heater_w,

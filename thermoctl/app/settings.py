@@ -100,6 +100,11 @@ def settings_in(document: Document) -> Settings:
     return _Reading(document).settings()
 
 
+def boards_in(paths: Iterable[str | Path]) -> dict[str, BaseModel]:
+    """Return the boards of several files and nothing else; raise as `load` does."""
+    return _Reading(read_document(Path(path) for path in paths)).boards()
+
+
 class _Reading:
     """One reading of a document, which goes on after an error so that all are told at once."""
 
@@ -118,6 +123,13 @@ class _Reading:
         if self._problems:
             raise BadConfiguration(self._problems)
         return Settings.model_validate({**tables, "loops": as_blocks(tables["loops"])})
+
+    def boards(self) -> dict[str, BaseModel]:
+        """Return the boards alone; raise `BadConfiguration` with all that is wrong with them."""
+        boards = {name: each for name, each in self._boards().items() if each is not None}
+        if self._problems:
+            raise BadConfiguration(self._problems)
+        return boards
 
     def _boards(self) -> dict[str, BaseModel | None]:
         """Return each board's settings by the model of its kind."""

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 import numpy as np
+from pydantic import BaseModel
 
 from thermoctl.errors import Unavailable
 from thermoctl.model.actuator import Linear
@@ -107,6 +108,26 @@ class Wiring:
     noise_mv: float = 5.0
     pickup_mv: float = 20.0
     mains_hz: float = 50.0
+
+
+_OWN = {
+    "it has a converter of its own": {"bits", "reference_v", "conversions"},
+    "it has a power stage of its own": {"power_stage", "dac_bits"},
+    "its dead-man is set over its port": {"dead_man_s"},
+    "it has one input": {"second_sensor", "second_lag_s", "second_gain_error", "element_sensor"},
+    "it only heats": {"cooler_w", "cooler_lag_s"},
+}
+"""What a simulated tank may have and this board does not, by what there is instead."""
+
+
+def left_out(name: str, board: BaseModel) -> list[str]:
+    """Return a line for what the simulated board `name` says and this one has not."""
+    written = board.model_fields_set
+    return [
+        f"boards.{name}: {', '.join(sorted(keys & written))} not used by a thermodaq: {instead}"
+        for instead, keys in _OWN.items()
+        if keys & written
+    ]
 
 
 class WiredBoard:

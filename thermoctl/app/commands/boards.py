@@ -21,9 +21,11 @@ from thermoctl.app.commands.options import (
 from thermoctl.errors import ConfigError
 
 if TYPE_CHECKING:
+    from thermoctl.app.simulate import Wiring
     from thermoctl.plant.parameters import TankParameters
 
 _GAP = "  "
+_SEED = 1
 
 
 # -- what can be connected -------------------------------------------------------------------------
@@ -145,7 +147,11 @@ def doctor(
     help="Where the board's port shall be.",
 )
 @config_option
-@click.option("--seed", type=click.IntRange(min=0), default=1, help="Seed of the simulation.")
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    help="Seed of the simulation; that of the board in FILE, or 1, when not given.",
+)
 @click.option(
     "--firmware",
     type=click.Choice(["auto", "simavr", "python"]),
@@ -154,23 +160,32 @@ def doctor(
 )
 @click.option("--duration", type=DURATION, default=float("inf"), help="End after this: 10m, 1h.")
 def simulate(
-    kind: str, link: Path, configs: tuple[Path, ...], seed: int, firmware: Any, duration: float
+    kind: str,
+    link: Path,
+    configs: tuple[Path, ...],
+    seed: int | None,
+    firmware: Any,
+    duration: float,
 ) -> None:
     """Put a simulated board of a KIND, wired to a simulated tank, behind a port.
 
     KIND is thermodaq.
 
-    A board of kind "simulated" in FILE says what the tank is like; else it is that of Özbek (2021).
+    A board of kind "simulated" in FILE says what tank and wires are like, and no loop is needed
+    there; else the tank is that of Özbek (2021). Converter and dead-man are those of the board.
     """
     from thermoctl.app.simulate import simulate_thermodaq
 
-    parameters = _tank(configs)
+    parameters, wiring, seed, notes = _described(configs, seed)
+    for note in notes:
+        click.echo(f"thermoctl: {note}", err=True)
     ended: list[int] = []
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, lambda number, frame: ended.append(number))
     simulate_thermodaq(
         link,
         parameters=parameters,
+        wiring=wiring,
         seed=seed,
         firmware=firmware,
         stop=lambda: bool(ended),
@@ -179,19 +194,22 @@ def simulate(
     )
 
 
-def _tank(configs: tuple[Path, ...]) -> TankParameters | None:
-    """Return the tank that the first simulated board of a configuration describes, if any."""
-    from thermoctl.app.settings import load_all
-    from thermoctl.plant.parameters import TankParameters
-    from thermoctl_drivers.simulated import SimulatedSettings
+def _described(
+    configs: tuple[Path, ...], seed: int | None
+) -> tuple[TankParameters | None, Wiring, int, list[str]]:
+    """Return tank, wires and seed of the first simulated board, and what is to be said of it."""
+    from thermoctl.app.settings import boards_in
+    from thermoctl.app.simulate import Wiring, left_out
+    from thermoctl_drivers.simulated import SimulatedSettings, tank_parameters
 
-    for board in load_all(configs).boards.values() if configs else ():
+    for name, board in boards_in(configs).items() if configs else ():
         if isinstance(board, SimulatedSettings):
-            return TankParameters.scaled(
-                board.volume_l,
-                board.heater_w,
-                ambient_c=board.ambient_c,
-                initial_c=board.initial_c,
-                ice_kg=board.ice_kg,
-            )
-    return None
+            board = board if seed is None else board.model_copy(update={"seed": seed})
+            try:
+                parameters = tank_parameters(board)
+            except ValueError as error:
+                raise ConfigError(f"boards.{name}: {error}") from error
+            wiring = Wiring(board.noise_mv, board.pickup_mv, board.mains_hz)
+            return parameters, wiring, board.seed, left_out(name, board)
+    missing = ["no board of kind simulated there: the tank is that of Özbek (2021)"]
+    return None, Wiring(), _SEED if seed is None else seed, missing if configs else []
