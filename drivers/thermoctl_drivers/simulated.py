@@ -79,7 +79,11 @@ class SimulatedSettings(BaseModel):
     bits: int = Field(10, ge=8, le=24, description="Resolution of the A/D converter, in bits.")
     reference_v: float = Field(5.0, ge=3.0, le=10.0, description="A/D full scale, in V.")
     conversions: int = Field(
-        32, ge=1, le=1000, description="Conversions in a burst, spread over two mains periods."
+        32,
+        ge=1,
+        le=1000,
+        description="Conversions in a burst, spread over two mains periods; fewer than 4 spoil "
+        "regulation and learning.",
     )
     noise_mv: float = Field(1.0, ge=0.0, le=100.0, description="Noise per conversion, rms in mV.")
     pickup_mv: float = Field(3.0, ge=0.0, le=100.0, description="Mains pickup, amplitude in mV.")

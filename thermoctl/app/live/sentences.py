@@ -42,6 +42,7 @@ _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
     "board.wrong": (Mark.ALARM, ("Not board {board}: {error}", "Another device answers")),
     "change.detected": (Mark.CHANGE, ("{text}", "The water has jumped")),
     "clock.stepped": (Mark.NONE, ("Wall clock stepped by {step_s}", "Wall clock stepped")),
+    "config.coarse": (Mark.WARNING, ("Coarse readings: {text}", "Readings are coarse")),
     "config.loaded": (Mark.NONE, ("Settings loaded: {path}", "Settings loaded")),
     "control.recovered": (
         Mark.NONE,

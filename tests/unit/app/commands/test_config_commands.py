@@ -139,6 +139,16 @@ def test_a_file_that_its_group_may_write_to_passes_with_a_warning(run, file):
     assert err.startswith(f"thermoctl: {file}: group ")
 
 
+def test_a_check_says_that_readings_are_coarse_and_what_to_set(run, file):
+    text = file.read_text().replace("volume_l = 8.0", "bits = 10\nconversions = 1")
+    file.write_text(text)
+    code, out, err = run("config", "check", "-c", file)
+    assert (code, out.startswith(f"{file}: ok")) == (0, True)
+    assert "thermoctl: loops.tank.sensor: a conversion of boards.daq is in steps of 488 mK" in err
+    _, out, _ = run("config", "check", "-c", file, "--json")
+    assert "conversions to 32" in json.loads(out)["warnings"][0]
+
+
 # -- show and schema -------------------------------------------------------------------------------
 
 
