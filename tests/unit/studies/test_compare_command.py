@@ -6,6 +6,7 @@ import re
 import pytest
 from click.testing import CliRunner
 
+from thermoctl.app.cli import main
 from thermoctl.app.commands.compare import RESULTS, compare, contender
 from thermoctl.app.plugins import BadOption
 from thermoctl.app.settings import load
@@ -118,6 +119,37 @@ def test_a_comparison_prints_a_table_draws_a_page_and_keeps_its_runs(tmp_path):
     names = {file.name for file in tmp_path.iterdir()}
     assert names >= {RESULTS, "compare.png", "compare.svg"}
     assert len((tmp_path / RESULTS).read_text().splitlines()) == 2
+
+
+@pytest.fixture
+def ended(capsys, monkeypatch):
+    """Return a function that runs the program, and returns exit code, stdout and stderr."""
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def ended(*arguments):
+        with pytest.raises(SystemExit) as end:
+            main(["compare", *map(str, arguments)])
+        return (end.value.code, *capsys.readouterr())
+
+    return ended
+
+
+def test_a_check_ends_with_1_when_the_first_controller_misses_a_goal(tmp_path, ended):
+    arguments = ["--controller", "on-off", *BRIEF, "--out", tmp_path]
+    code, _, said = ended(*arguments, "--check")
+    assert code == 1
+    assert "on-off misses a goal of rig, warm-up: expected overshoot median 0.08" in said
+    assert "expected settled after median 1.2, 95 % 1.4 × at most, got never / never (" in said
+    code, printed, _ = ended(*arguments, "--check", "--json")
+    assert code == 1
+    assert json.loads(printed)["lines"]
+    assert ended(*arguments)[0] == 0  # a comparison that could be made
+
+
+def test_a_check_asks_nothing_of_the_others(tmp_path, ended):
+    both = ["--controller", "adaptive", "--controller", "on-off", *BRIEF, "--out", tmp_path]
+    code, _, said = ended(*both, "--check")
+    assert (code, "misses" in said) == (0, False)
 
 
 def test_json_is_one_object_and_the_second_time_nothing_is_run(tmp_path):

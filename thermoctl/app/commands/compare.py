@@ -14,6 +14,7 @@ from typing import Any
 import click
 
 from thermoctl.app import plugins
+from thermoctl.app.commands.endings import EXIT_FAILED
 from thermoctl.app.commands.options import FILE, Parsed, examples, json_option
 from thermoctl.app.commands.results import (
     console,
@@ -35,7 +36,7 @@ from thermoctl.studies.compare.baselines import BASELINES, options_for, require
 from thermoctl.studies.compare.figure import MOST_DRAWN, draw_comparison
 from thermoctl.studies.compare.plants import FLEETS, Plant, Usage, plant
 from thermoctl.studies.compare.present import as_json as lines_as_json
-from thermoctl.studies.compare.present import print_table
+from thermoctl.studies.compare.present import misses, print_table
 from thermoctl.studies.compare.run import Contender, Job, finished, jobs_for
 from thermoctl.studies.compare.scenarios import SCENARIOS, SETPOINT
 from thermoctl.studies.compare.store import Result, Store
@@ -214,6 +215,11 @@ def _name(what: str, known: Sequence[str]) -> Parsed:
     show_default=True,
     help="Folder of results and figure; what is there is not run again.",
 )
+@click.option(
+    "--check",
+    is_flag=True,
+    help="Exit 1 when the first controller misses a goal; the others are there to compare with.",
+)
 @json_option
 def compare(
     texts: Sequence[str],
@@ -225,8 +231,9 @@ def compare(
     nameplate: bool,
     jobs: int | None,
     out: Path,
+    check: bool,
     as_json: bool,
-) -> None:
+) -> int:
     """Compare controllers on the same simulated plants, as ratios to bounds.
 
     Every controller meets the same plants, mishaps and noise, and is judged on the true temperature
@@ -250,6 +257,9 @@ def compare(
         print_json({"lines": lines_as_json(lines), "conditions": conditions})
     else:
         print_table(console(), lines, names)
+    missed = misses(lines, names[0]) if check else []
+    say(missed)
+    return EXIT_FAILED if missed else 0
 
 
 def _contenders(

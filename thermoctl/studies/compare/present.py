@@ -95,7 +95,7 @@ def _table(console: Console, lines: Sequence[Line], controllers: Sequence[str]) 
             line.scenario if line.scenario != scenario else "",
             f"{MEASURES[line.measure].heading}, {unit_of(line)}",
             _bound(line),
-            ", ".join(goal_words(line, goal) for goal in line.goals) or "–",
+            _goals(line) or "–",
             *cells,
             "–" if first is None else verdict(first),
         ]
@@ -127,6 +127,22 @@ def goal_words(line: Line, goal: Goal) -> str:
     """Return a goal in words, in the unit of its line."""
     factor = 1.0 if line.in_bounds else MEASURES[line.measure].factor
     return f"{STATISTICS[goal.statistic]} {goal.at_most * factor:.3g}"
+
+
+def _goals(line: Line) -> str:
+    """Return the goals of a line, empty where there are none."""
+    return ", ".join(goal_words(line, goal) for goal in line.goals)
+
+
+def misses(lines: Sequence[Line], controller: str) -> list[str]:
+    """Return a sentence for each measure in which `controller` misses a goal."""
+    return [
+        f"{controller} misses a goal of {line.fleet}, {line.scenario}: expected"
+        f" {MEASURES[line.measure].heading} {_goals(line)} {unit_of(line)} at most,"
+        f" got {_cell(line, line.scores[controller]).rstrip(f' {MISSED}')} (median / 95 %)"
+        for line in lines
+        if controller in line.scores and line.scores[controller].passed is False
+    ]
 
 
 def _cell(line: Line, score: Score | None) -> str:
