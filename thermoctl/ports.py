@@ -118,7 +118,10 @@ class Simulated(Protocol):
     """What only a simulated board can do: tell the truth, and be disturbed."""
 
     def truth(self) -> Mapping[str, float]:
-        """Return what no sensor sees, such as ``true_temperature_c``."""
+        """Return what no sensor sees, such as ``true_temperature_c``.
+
+        That is of every input but one with a key of its own: of ``element`` it is ``element_c``.
+        """
         ...
 
     def disturb(self, name: str, amount: float | None = None) -> str:

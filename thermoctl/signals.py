@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, Final
 
 from thermoctl.filling import quickly_filled
 from thermoctl.quantities import Array
@@ -330,6 +330,10 @@ class Step:
         whoever asks pays, in any thread, and the loop never does.
         """
         return self.tell()
+
+
+TRUE_TEMPERATURE: Final = "true_temperature_c"
+"""Key of a simulation's truth: the temperature that the sensor of a loop should show, in degC."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

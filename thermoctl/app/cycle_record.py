@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import Any
 
 from thermoctl.services.store import Latch
-from thermoctl.signals import Cycle, Estimate, Feasible, ShadowScore
+from thermoctl.signals import TRUE_TEMPERATURE, Cycle, Estimate, Feasible, ShadowScore
 
 _ENCODER = json.JSONEncoder(allow_nan=False, check_circular=False)  # a record is made afresh
 
@@ -69,8 +69,8 @@ def cycle_record(cycle: Cycle) -> dict[str, Any]:
         "late_s": round(cycle.late_s, 6),
         "alarms": [alarm.code for alarm in step.alarms],
     }
-    if "true_temperature_c" in cycle.truth:  # of a simulation, which alone knows it
-        record["true_temperature_c"] = cycle.truth["true_temperature_c"]
+    if TRUE_TEMPERATURE in cycle.truth:  # of a simulation, which alone knows it
+        record[TRUE_TEMPERATURE] = cycle.truth[TRUE_TEMPERATURE]
     return record
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from thermoctl.app.cycle_record import finite
 from thermoctl.app.live import numbers
-from thermoctl.signals import Cycle
+from thermoctl.signals import TRUE_TEMPERATURE, Cycle
 from thermoctl.studies.words import duration
 
 SETTLED_K = 0.1
@@ -58,7 +58,7 @@ class Summary:
             if self._power is not None:
                 self._travel += abs(cycle.accepted_power - self._power)
             self._power = cycle.accepted_power
-        temperature_c = cycle.truth.get("true_temperature_c", step.measurement.temperature_c)
+        temperature_c = cycle.truth.get(TRUE_TEMPERATURE, step.measurement.temperature_c)
         if math.isfinite(temperature_c):
             self._temperature_c = temperature_c
             self._judge(temperature_c - step.setpoint_c, step.t_s)

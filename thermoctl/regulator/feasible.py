@@ -244,7 +244,8 @@ class Feasibility:
         if self._unseen_s > UNSEEN_S:
             self.known = Feasible()
             return
-        self.known = self._feasible(belief, wanted, t_s)
+        # A set point that never rests says nothing of what can be held, nor of an arrival.
+        self.known = Feasible() if wanted.led else self._feasible(belief, wanted, t_s)
         self._tell(belief, wanted, t_s)
 
     # -- what follows ----------------------------------------------------------------------------

@@ -290,7 +290,7 @@ class Loop:
     ) -> None:
         """Publish the finished cycle of one loop."""
         told = replace(step, events=(*step.events, *events)) if events else step
-        truth = wiring.sensor_board.truth()
+        truth = wiring.truth()
         self._publish(Cycle(wiring.name, told, accepted, tick_us, late_s, self.missed, truth))
 
     # -- when something fails --------------------------------------------------------------------

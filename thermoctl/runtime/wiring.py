@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from thermoctl.model.actuator import ActuatorLaw
@@ -12,6 +12,7 @@ from thermoctl.quantities import is_finite_number
 from thermoctl.regulator import Regulator
 from thermoctl.runtime.connection import Connection
 from thermoctl.runtime.lead import Lead
+from thermoctl.signals import TRUE_TEMPERATURE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +76,8 @@ class Wiring:
     """The sensor, and the second one where there is one."""
     outputs: tuple[Output, ...] = field(init=False, repr=False)
     """The heater, and the cooler where there is one."""
+    own_truth: str = field(init=False, repr=False)
+    """What the truth of its input is called where that is not the truth of the whole board."""
 
     def __post_init__(self) -> None:
         board = self.actuator_board
@@ -84,6 +87,13 @@ class Wiring:
         inputs = (first,) if self.second is None else (first, self.second)
         object.__setattr__(self, "outputs", outputs)
         object.__setattr__(self, "inputs", inputs)
+        object.__setattr__(self, "own_truth", f"{self.input}_c")
+
+    def truth(self) -> Mapping[str, float]:
+        """Return what a simulated board knows, the true temperature that of this input."""
+        told = self.sensor_board.truth()
+        own_c = told.get(self.own_truth)
+        return told if own_c is None else {**told, TRUE_TEMPERATURE: own_c}
 
     @property
     def boards(self) -> tuple[Connection, ...]:

@@ -7,9 +7,10 @@ import pytest
 from thermoctl.app.compose import loop_for, wiring_errors
 from thermoctl.app.configuration.document import BadConfiguration
 from thermoctl.app.configuration.tables import CascadeTable
+from thermoctl.app.cycle_record import cycle_record
 from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
-from thermoctl.app.sim import bench_settings
+from thermoctl.app.sim import bench_settings, simulate
 from thermoctl.app.tuning.trial import alone
 from thermoctl.control.adaptive.constants import Lags
 from thermoctl.errors import ConfigError
@@ -119,3 +120,23 @@ def test_what_is_configured_of_a_follower_stays():
     plan = plan_for(load(document).loops["block"])
     assert plan.shadow.lags == Lags(2.0)
     assert plan.limits.jump_for(0.1, 0.0) == 12.0
+
+
+@pytest.fixture(scope="module")
+def ran():
+    """The last cycle of each loop of the profile after some minutes."""
+    return {cycle.loop: cycle for cycle in simulate(load(CONFIG / "cascade.toml"), 400.0, 1)}
+
+
+def test_each_loop_is_told_the_true_temperature_of_what_its_own_sensor_is_in(ran):
+    block, bath = cycle_record(ran["block"]), cycle_record(ran["bath"])
+    assert block["true_temperature_c"] == ran["bath"].truth["element_c"]
+    assert block["true_temperature_c"] == pytest.approx(block["temperature_c"], abs=0.5)
+    assert bath["true_temperature_c"] == pytest.approx(bath["temperature_c"], abs=0.5)
+    assert block["true_temperature_c"] > bath["true_temperature_c"] + 5.0
+
+
+def test_what_can_be_held_is_told_of_the_outer_loop_alone(ran):
+    told = {name: cycle_record(cycle)["feasible"] for name, cycle in ran.items()}
+    assert told["bath"]["highest_c"] is not None
+    assert set(told["block"].values()) == {None}

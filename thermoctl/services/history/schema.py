@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from thermoctl.services.plain import as_json
-from thermoctl.signals import Cycle, Event
+from thermoctl.signals import TRUE_TEMPERATURE, Cycle, Event
 
 SCHEMA_VERSION: Final = 3
 """Kept in ``PRAGMA user_version``; a higher one was written by a newer thermoctl."""
@@ -23,8 +23,6 @@ APPLICATION_ID: Final = 0x7468726D
 
 Value = float | int | str | None
 Kind = Literal["REAL", "INTEGER", "TEXT"]
-
-TRUE_TEMPERATURE: Final = "true_temperature_c"
 
 
 @dataclass(frozen=True, slots=True)
