@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thermoctl.control.adaptive import Adaptive
+from thermoctl.control.cooling import heat_of, power_for_heat
 from thermoctl.control.mirror import mirrored
 from thermoctl.control.on_off import OnOff
 from thermoctl.control.pid import Pid
@@ -88,8 +89,8 @@ def test_with_the_heater_alone_in_use_it_is_the_law_that_only_heats():
 @given(power=st.floats(-1.0, 1.0), ratio=st.floats(0.02, 10.0))
 def test_heat_and_power_are_each_other_s_inverse(power, ratio):
     law = Adaptive(action="heat-cool", cooling_ratio=ratio)
-    assert law._power(law._heat(power)) == pytest.approx(power)
-    assert law._heat(-1.0) == -ratio == law.bank.u_min
+    assert power_for_heat(heat_of(power, ratio), ratio) == pytest.approx(power)
+    assert heat_of(-1.0, ratio) == -ratio == law.bank.u_min
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.01, 11.0, math.nan, -0.2])

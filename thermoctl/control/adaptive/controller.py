@@ -22,6 +22,7 @@ from thermoctl.control.adaptive.plant_belief import (
 )
 from thermoctl.control.adaptive.remembered import recalled, remember
 from thermoctl.control.adaptive.trial import Memory
+from thermoctl.control.cooling import RATIO_MAX, RATIO_MIN, heat_of, power_for_heat
 from thermoctl.control.inexact import EXACT, Inexact
 from thermoctl.control.lasting import Lasting
 from thermoctl.control.minimum_variance import HOLDING_SD_MAX, RIDE_MAX_S
@@ -116,7 +117,7 @@ class Adaptive:
     calmness: float = ranged(0.35, 0.1, 10.0)
     period_s: float = 1.0
     action: Literal["heat", "cool", "heat-cool"] = "heat"
-    cooling_ratio: float = ranged(0.2, 0.02, 10.0)
+    cooling_ratio: float = ranged(0.2, RATIO_MIN, RATIO_MAX)
     lags: Lags = field(default_factory=Lags)
     plants: Plants = field(default_factory=Plants)
     hearing: Hearing = field(default_factory=Hearing)
@@ -138,14 +139,6 @@ class Adaptive:
         """+1 or -1: to a lone cooler everything looks upside down, but for its power."""
         return -1.0 if self.action == "cool" else 1.0
 
-    def _heat(self, power: float) -> float:
-        """Return the heat of `power` in units of the heater's: less where a cooler is weaker."""
-        return power * self.cooling_ratio if power < 0.0 else power
-
-    def _power(self, heat: float) -> float:
-        """Return the power that gives `heat`."""
-        return heat / self.cooling_ratio if heat < 0.0 else heat
-
     def start(self) -> AdaptiveBelief:
         """Return the belief before the first sample: nothing is known."""
         return AdaptiveBelief(self.bank.start())
@@ -166,7 +159,7 @@ class Adaptive:
 
     def under(self, belief: AdaptiveBelief, power: float) -> AdaptiveBelief:
         """Return the `belief` to begin with of a plant that has long had `power`."""
-        law, heat, rival = self.bank, self._heat(power), belief.memory.rival
+        law, heat, rival = self.bank, heat_of(power, self.cooling_ratio), belief.memory.rival
         if rival is not None:
             rival = law.under(rival, heat)
         memory = replace(belief.memory, rival=rival)
@@ -187,7 +180,7 @@ class Adaptive:
         """Return the belief after this sample, whoever steers."""
         h, interval_s = self.period_s, situation.interval_s
         behind_s, since_s = belief.behind_s + interval_s, belief.since_s + interval_s
-        applied = self._heat(situation.applied)
+        applied = heat_of(situation.applied, self.cooling_ratio)
         inexact = belief.inexact.after(situation)
         given_s = belief.given_s + applied * interval_s
         bank, memory, gathered = belief.bank, belief.memory, belief.since_s > 0.0
@@ -240,7 +233,7 @@ class Adaptive:
             self.pace,
             situation.kept_s,
         )
-        return belief, belief.inexact.made_up_for(self._power(heat))
+        return belief, belief.inexact.made_up_for(power_for_heat(heat, self.cooling_ratio))
 
     def surprise_k(self, belief: AdaptiveBelief, situation: Situation) -> float:
         """Return reading minus what the hypotheses expected; NaN beyond one period."""
@@ -252,7 +245,7 @@ class Adaptive:
         if outlook is None:
             return Beliefs()
         known = sds.holding_power <= HOLDING_SD_MAX
-        holding_power = self._power(outlook.holding_power) if known else None
+        holding_power = power_for_heat(outlook.holding_power, self.cooling_ratio) if known else None
         rate, lag_s = self._sign * outlook.gain, outlook.lag_s
         return Beliefs(rate, sds.gain, holding_power=holding_power, lag_s=lag_s)
 
@@ -263,7 +256,7 @@ class Adaptive:
             return told
         return replace(
             told,
-            holding_power=self._power(told.holding_power),
+            holding_power=power_for_heat(told.holding_power, self.cooling_ratio),
             holding_power_sd=told.holding_power_sd / self.cooling_ratio,
         )
 
