@@ -73,7 +73,8 @@ def play(row):
     document = load(CONFIG / f"{row.profile}.toml").model_dump()
     document["boards"]["daq"] |= {"tolerances": 0.1, **row.board}
     loop = document["loops"]["tank"]
-    loop["controller"] |= row.controller
+    ours = {} if "kind" in row.controller else loop["controller"]
+    loop["controller"] = {**ours, **row.controller}
     if loop["cooler"] is not None:
         loop["cooler"]["changeover_s"] = row.changeover_s
     cycles, clock, legs = [], SimulatedClock(), []
@@ -113,6 +114,36 @@ def test_the_second_uses_meet_their_figures(row):
         assert not any(c.truth["heater_w"] and c.step.command.power < 0.0 for c in cycles[1:])
         missed |= {(leg, k): v for k, v in measured.items() if not v <= getattr(leg, k)}
     assert missed == {}
+
+
+# -- a pid that is told how weak its cooler is -----------------------------------------------------
+
+
+def seconds_outside(leg, cycles, band_k=0.1):
+    """Return after how many seconds of a leg the water stays within the band."""
+    truth = np.array([cycle.truth["true_temperature_c"] for cycle in cycles])
+    return int(np.flatnonzero(np.abs(truth - leg.setpoint_c) > band_k)[-1]) + 1
+
+
+@pytest.mark.parametrize("changeover_s", [5.0, 60.0])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_pid_that_is_told_the_ratio_settles_sooner_than_one_that_is_not(seed, changeover_s):
+    legs = (Leg(30.0, 900), Leg(18.0, 2700), Leg(15.0, 1800), Leg(24.0, 1500))
+    measured = {}
+    for ratio in (1.0, 0.2):
+        pid = {"kind": "pid", "action": "heat-cool", "cooling_ratio": ratio}
+        row = Row("", "heat-cool", legs, seed, controller=pid, changeover_s=changeover_s)
+        measured[ratio] = [
+            {**figures(leg, cycles), "settled_s": seconds_outside(leg, cycles)}
+            for leg, cycles in zip(legs, play(row), strict=True)
+        ]
+        print(f"seed {seed}, changeover {changeover_s:g} s, ratio {ratio:g}:", *measured[ratio])
+    for untold, told in zip(measured[1.0], measured[0.2], strict=True):
+        assert told["settled_s"] < untold["settled_s"] - 80
+    for untold, told in zip(measured[1.0][1:3], measured[0.2][1:3], strict=True):
+        assert told["overshoot_k"] <= 0.1
+        assert untold["overshoot_k"] > 0.3
+        assert told["deviation_mk"] <= 50.0  # of BOTH's and WAITING's cold legs
 
 
 # -- a loop within a loop --------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 from thermoctl.control.autotune import AutoTune, Experiment, Found, GivenUp, Tuning
+from thermoctl.control.cooling import RATIO_MAX, RATIO_MIN, heat_of, power_for_heat
 from thermoctl.control.inexact import ahead, given
 from thermoctl.control.mirror import mirrored
 from thermoctl.control.pid_remembered import as_remembered, found_before
@@ -20,7 +21,7 @@ from thermoctl.control.simc import Gains
 from thermoctl.control.step_test import StepTest
 from thermoctl.ports import Situation
 from thermoctl.quantities import is_finite_number
-from thermoctl.ranges import require
+from thermoctl.ranges import check_ranges, ranged
 from thermoctl.signals import Beliefs
 
 
@@ -88,7 +89,10 @@ class Pid:
         Time between two samples, as the loop has it.
     action : {'heat', 'cool', 'heat-cool'}
         What power does to the plant; heat-cool: a positive one heats and a negative one cools, by
-        the same gains, and tests are made with the heater.
+        the same gains in units of heat, and tests are made with the heater.
+    cooling_ratio : float
+        For heat-cool: what the cooler takes out at full power over what the heater brings in, from
+        .02 to 10. Its gains below 0 are those of the heater over this.
 
     Raises
     ------
@@ -99,14 +103,15 @@ class Pid:
     gain_per_k: float = 0.1
     integral_s: float = 600.0
     derivative_s: float = 0.0
-    derivative_filter: float = 10.0
-    setpoint_weight: float = 0.7
+    derivative_filter: float = ranged(10.0, 1.0, 100.0)
+    setpoint_weight: float = ranged(0.7, 0.0, 1.0)
     tuning: Literal["fixed", "simc", "relay"] = "simc"
     tuned_form: Literal["pi", "pid"] = "pi"
     tuning_limit_s: float = 14400.0
-    relay_amplitude: float = 0.25
+    relay_amplitude: float = ranged(0.25, 0.02, 0.5)
     period_s: float = 1.0
     action: Literal["heat", "cool", "heat-cool"] = "heat"
+    cooling_ratio: float = ranged(1.0, RATIO_MIN, RATIO_MAX)
     autotune: AutoTune | None = field(init=False, repr=False, compare=False)
 
     name: ClassVar[str] = "pid"
@@ -118,13 +123,7 @@ class Pid:
                 raise ValueError(f"{name} must be positive, got {value!r}")
         if not is_finite_number(self.derivative_s) or self.derivative_s < 0.0:
             raise ValueError(f"derivative_s must be at least 0, got {self.derivative_s!r}")
-        ranges = {
-            "derivative_filter": (1.0, 100.0),
-            "setpoint_weight": (0.0, 1.0),
-            "relay_amplitude": (0.02, 0.5),
-        }
-        for name, (low, high) in ranges.items():
-            require(name, getattr(self, name), low, high)
+        check_ranges(self)
         if self.tuning not in ("fixed", "simc", "relay"):
             raise ValueError(f"tuning must be 'fixed', 'simc' or 'relay', got {self.tuning!r}")
         if self.action not in ("heat", "cool", "heat-cool"):
@@ -176,13 +175,14 @@ class Pid:
 
     def observe(self, belief: PidBelief, situation: Situation) -> PidBelief:
         """Return the belief after this sample, whoever steered up to it."""
+        # how exact an output is, is a matter of its power; what the plant was given, one of heat
+        ahead_s = ahead(belief.ahead_s, situation)
+        left = heat_of(given(situation, pulses=ahead_s > 0.0), self.cooling_ratio)
         situation = self._seen(situation)
         tuning, law = belief.tuning, self._law(belief)
         if self.autotune is not None:
             tuning = self.autotune.observe(tuning, situation)
-        before, interval_s = belief.terms, situation.interval_s
-        ahead_s = ahead(belief.ahead_s, situation)
-        setpoint_c, left = situation.setpoint_c, given(situation, pulses=ahead_s > 0.0)
+        before, interval_s, setpoint_c = belief.terms, situation.interval_s, situation.setpoint_c
         terms = law.see(before, situation.temperature_c, interval_s)
         known = math.isfinite(before.seen_c) and math.isfinite(setpoint_c)
         if known and math.isfinite(before.asked) and interval_s < law.gains.integral_s:
@@ -207,8 +207,9 @@ class Pid:
         if math.isnan(terms.integral) or tuning.outcome is not belief.tuning.outcome:
             holding = tuning.outcome.holding_power if isinstance(tuning.outcome, Found) else 0.0
             terms = law.at_rest(terms, setpoint_c, holding)
-        power = law.power(terms, setpoint_c)
-        return replace(belief, terms=replace(terms, asked=power), tuning=tuning), power
+        heat = law.power(terms, setpoint_c)
+        belief = replace(belief, terms=replace(terms, asked=heat), tuning=tuning)
+        return belief, power_for_heat(heat, self.cooling_ratio)
 
     def gains(self, belief: PidBelief) -> Gains:
         """Return the gains in force."""
@@ -230,8 +231,12 @@ class Pid:
         return Beliefs(-outcome.slope_k_per_s if self.action == "cool" else outcome.slope_k_per_s)
 
     def _seen(self, situation: Situation) -> Situation:
-        """Return `situation` as a law that heats meets it."""
-        return mirrored(situation) if self.action == "cool" else situation
+        """Return `situation` as a law that heats meets it, with the heat that was applied."""
+        if self.action == "cool":
+            return mirrored(situation)
+        if situation.applied < 0.0:
+            return replace(situation, applied=heat_of(situation.applied, self.cooling_ratio))
+        return situation
 
     def ride_s(self, belief: PidBelief) -> float:
         """Return 0: it has no model to steer by without a sensor."""

@@ -93,10 +93,11 @@ def test_heat_and_power_are_each_other_s_inverse(power, ratio):
     assert heat_of(-1.0, ratio) == -ratio == law.bank.u_min
 
 
+@pytest.mark.parametrize("law", [Adaptive, Pid])
 @pytest.mark.parametrize("ratio", [0.0, 0.01, 11.0, math.nan, -0.2])
-def test_a_ratio_out_of_range_is_refused_by_name(ratio):
+def test_a_ratio_out_of_range_is_refused_by_name(law, ratio):
     with pytest.raises(ValueError, match="cooling_ratio"):
-        Adaptive(action="heat-cool", cooling_ratio=ratio)
+        law(action="heat-cool", cooling_ratio=ratio)
 
 
 @pytest.mark.parametrize("law", [Adaptive, OnOff, Pid])
