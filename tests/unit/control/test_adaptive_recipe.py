@@ -61,9 +61,9 @@ class Filter:
         noise = [(0.08 * b) ** 2, 0.003**2, (0.0008 * b * restless) ** 2, (2e-4 * b) ** 2]
         before = self.x[0]
         self.x = F @ self.x
+        self.grow(self.x[0] - before)
         if steady:
             return
-        self.grow(self.x[0] - before)
         self.knew = self.P
         self.P = F @ self.P @ F.T + self.h * np.diag(noise)
         if self.arrives(t_s):

@@ -207,13 +207,11 @@ def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0
 
 
 def moved(block: Block, heat: Array, constants: PerPeriod) -> Block:
-    """Return the block one period later, with P and the loss as they are.
-
-    At rest water moves by millikelvins: what loss that costs is far below what is corrected of it.
-    """
+    """Return the block one period later as `predicted` does, but with P as it is."""
     after = block.copy()
     water, sensor, d, beta = after[T, X], after[Z, X], after[D, X], after[BETA, X]
-    _carried(water, sensor, d, beta, heat, constants.step[X], constants.soon[X])
+    warming = _carried(water, sensor, d, beta, heat, constants.step[X], constants.soon[X])
+    grown(after, warming, constants)
     return after
 
 
