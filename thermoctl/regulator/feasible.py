@@ -16,7 +16,7 @@ from thermoctl.control.heat_belief import HeatBelief, Known, T
 from thermoctl.control.heat_loss import Stretch
 from thermoctl.quantities import clamp
 from thermoctl.regulator.alarms import AlarmRegister
-from thermoctl.regulator.foretold import Settling, Slip
+from thermoctl.regulator.foretold import Nearing, Settling, Slip
 from thermoctl.regulator.guard import Failure
 from thermoctl.regulator.left_alone import PATIENCE_S, Beyond, LeftAlone
 from thermoctl.regulator.supervisor import Emit
@@ -139,7 +139,7 @@ class Feasibility:
         self._asked = 0.0  # of it, what was commanded; below 0 that of another actuator
         self._reading_c = math.nan
         self._unseen_s = 0.0
-        self._slip, self._settling = Slip(), Settling()
+        self._slip, self._settling, self._nearing = Slip(), Settling(), Nearing()
         self._alone = LeftAlone()
         self._failed = False
         self._standings = {UNREACHABLE: Standing(), DRIVEN: Standing()}
@@ -207,6 +207,7 @@ class Feasibility:
         self._belief, self._gathered, self._before = None, Gathered(), Gathered()
         self._heat, self._asked, self.known = 0.0, 0.0, Feasible()
         self._alone.clear()
+        self._nearing.clear()
 
     def fail(self, failure: Failure) -> None:
         """Forget what could not be reckoned with, and say so once.
@@ -255,6 +256,7 @@ class Feasibility:
         held = heat_loss.holding(belief, wanted.setpoint_c)
         holding = self._settling.doubted(held, wanted.setpoint_c, t_s)
         highest = _within(heat_loss.reach(belief, wanted.power_max), SD_MOST_K)
+        self._nearing.seen(highest, math.copysign(1.0, belief.gain), t_s)
         if wanted.beyond_ceiling:
             highest = Known(wanted.ceiling_c, ARRIVED_K)
         arrival = self._slip.doubted(self._arrival(belief, wanted, holding), wanted.setpoint_c, t_s)
@@ -316,6 +318,8 @@ class Feasibility:
         """Raise the alarms, or clear them."""
         full, none = self._heat >= FULL * wanted.power_max, abs(self._asked) <= NONE
         missing_sds = _missing_sds(belief, wanted, full)
+        if self._nearing.arrives(wanted.setpoint_c) and not wanted.beyond_ceiling:
+            missing_sds = 0.0  # what holds it back gives way
         driven_sds = self._driven_sds(belief, wanted, none)
         for code, sds, words in (
             (UNREACHABLE, missing_sds, _missing_words),

@@ -11,8 +11,14 @@ import math
 
 from thermoctl.control.heat_belief import Known
 
-SLIPS_S, SETTLES_S = 600.0, 600.0
-"""Memory of how late an arrival was, and of the power that was told to hold."""
+SLIPS_S, SETTLES_S, NEARS_S = 600.0, 600.0, 1800.0
+"""Memory of how late an arrival was, of the power that was told to hold, and of what was told to be
+the farthest that can be held."""
+MOVED_SDS, STAYS_SDS, SURELY_SDS = 1.5, 0.5, 3.0
+"""The farthest moves once it has done so by the first, and stands again below the second; it
+surely lies beyond the third."""
+WITHIN_S = 86_400.0
+"""Goods take no longer than a day."""
 
 
 class Slip:
@@ -59,3 +65,59 @@ class Settling:
             self._before = holding.mean + keep * (self._before - holding.mean)
         self._told_s = t_s
         return Known(holding.mean, math.hypot(holding.sd, holding.mean - self._before))
+
+
+class Nearing:
+    """Whether the farthest that power holds is itself on its way to the set point.
+
+    Goods behind quick air give off heat for hours. It looks like a loss with a steep slope, and so
+    like an end of the way; but that end moves on as they follow. That of a plant which loses as
+    much for good stays where it was found, within its error, and what surely can be held moves on
+    only until it is known.
+    """
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self._sign = self._told_s = math.nan
+        self._here = self._past = Known()
+        self._sure = self._sure_past = math.nan
+        self._moves = False
+
+    def seen(self, farthest: Known, sign: float, t_s: float) -> None:
+        """Take in the farthest that power holds, told at `t_s`.
+
+        Power drives in the direction `sign`.
+        """
+        here, sd = sign * farthest.mean, farthest.sd
+        if not math.isfinite(here):
+            return
+        sure = here - SURELY_SDS * sd
+        if sign != self._sign:
+            self.clear()
+            self._sign, self._told_s, self._sure, self._sure_past = sign, t_s, sure, sure
+        past, keep = self._past, math.exp((self._told_s - t_s) / NEARS_S)
+        if here >= past.mean:
+            self._past = Known(here + keep * (past.mean - here), sd + keep * (past.sd - sd))
+        else:  # it was never as near as was thought, or is seen for the first time
+            self._past = Known(here, sd)
+        self._sure = max(self._sure, sure)
+        self._sure_past = self._sure + keep * (self._sure_past - self._sure)
+        self._here, self._told_s = Known(here, sd), t_s
+
+    def arrives(self, setpoint_c: float) -> bool:
+        """Return whether it comes to `setpoint_c` within a day, as it has moved of late.
+
+        That it does ends later than it begins.
+        """
+        moved_k = self._here.mean - self._past.mean
+        sds = STAYS_SDS if self._moves else MOVED_SDS
+        surely_k = min(moved_k, self._sure - self._sure_past)
+        left_k = self._sign * setpoint_c - self._here.mean
+        self._moves = (
+            moved_k > sds * max(self._here.sd, self._past.sd)
+            and surely_k * WITHIN_S / NEARS_S > left_k
+        )
+        return self._moves
