@@ -13,6 +13,8 @@ from thermoctl.app.settings import load
 from thermoctl.signals import ManualPower, Mode, State
 from thermoctl.testing import ManualClock
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 CONFIG = Path(__file__).parents[2] / "config"
 
 

@@ -17,6 +17,8 @@ from thermoctl.runtime.wiring import Input, Wiring
 from thermoctl.signals import ManualPower, Mode, RawSample, State
 from thermoctl.testing import ManualClock, ScriptedBoard
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 LM335_AT_5_V = Sensor(LM335, 5.0)
 FULL_SCALE = 32768.0
 WARM = FULL_SCALE * LM335_AT_5_V.fraction(30.0)

@@ -104,6 +104,7 @@ def test_how_exact_a_cooler_is_goes_by_its_power_however_weak_it_is(applied, tak
 # -- limits ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.1, 0.2, 1.0, 4.0])
 @pytest.mark.parametrize("low", [-1.0, -0.5])
 def test_an_hour_at_the_limit_of_the_cooler_leaves_no_trace(low, ratio):

@@ -15,6 +15,8 @@ from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import Measurement, State
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 HEAT = (0.0,) * 6
 
 

@@ -14,6 +14,8 @@ from thermoctl.regulator.heater.doubt import Seen
 from thermoctl.regulator.heater.response import LAGS_S, Block, Gain
 from thermoctl.signals import Measurement, Mode
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 GAIN, LOSS = 0.04, 0.008
 HEATER = Gain(GAIN, 0.001, 2)
 LOOP = {

@@ -11,6 +11,8 @@ from thermoctl.regulator.heater.question import Answer, contrast, of_known
 from thermoctl.regulator.heater.response import LAGS_S, Gain
 from thermoctl.signals import Measurement
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 GAIN, LOSS = 0.04, 0.008
 HEATER = Gain(GAIN, 0.001, 1)
 SD_K = 0.01

@@ -18,6 +18,8 @@ from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import Measurement, State
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 LIMITS = Limits(200.0, -50.0, -50.0, 200.0)
 
 

@@ -15,6 +15,8 @@ from thermoctl.regulator.recollection import recall_heater, remembering
 from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import Measurement, State
 
+pytestmark = pytest.mark.slow  # together more than the quick subset can afford
+
 LIMITS = Limits(200.0, -50.0, -50.0, 200.0, power_min=-1.0)
 CHECK = HeaterCheck(action="heat-cool")
 
