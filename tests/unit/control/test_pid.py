@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from thermoctl.control.pid import Pid
-from thermoctl.control.pid_terms import PidTerms, Terms
-from thermoctl.control.simc import Gains
+from thermoctl.control.pid.simc import Gains
+from thermoctl.control.pid.terms import PidTerms, Terms
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
 from thermoctl.signals import Beliefs

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from thermoctl.control.pid import Pid
-from thermoctl.control.pid_terms import TOLERANCE
+from thermoctl.control.pid.terms import TOLERANCE
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
 

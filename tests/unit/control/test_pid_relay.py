@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from thermoctl.control.autotune import Found
 from thermoctl.control.pid import Pid
-from thermoctl.control.relay import RelayTest, harmonic_point, integrating_plant, limit_of
-from thermoctl.control.simc import Gains, Limit, Process, tyreus_luyben
-from thermoctl.control.stretch import Piece, Stretch
+from thermoctl.control.pid.autotune import Found
+from thermoctl.control.pid.relay import RelayTest, harmonic_point, integrating_plant, limit_of
+from thermoctl.control.pid.simc import Gains, Limit, Process, tyreus_luyben
+from thermoctl.control.pid.stretch import Piece, Stretch
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
 

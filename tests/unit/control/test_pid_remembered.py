@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from thermoctl.control.autotune import Found, Tuning
 from thermoctl.control.pid import Pid, PidBelief
-from thermoctl.control.simc import Gains
+from thermoctl.control.pid.autotune import Found, Tuning
+from thermoctl.control.pid.simc import Gains
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from thermoctl.control.simc import Gains, Limit, Process, simc, tyreus_luyben
+from thermoctl.control.pid.simc import Gains, Limit, Process, simc, tyreus_luyben
 
 # Skogestad's second example has lags 2, 1, .4, .2 and thrice .05, a zero at .08 and an inverse
 # response of .3, which count as dead time.

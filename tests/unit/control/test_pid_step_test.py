@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from thermoctl.control.pid import Pid
-from thermoctl.control.simc import Gains, Process, simc
-from thermoctl.control.step_fit import step_fit
-from thermoctl.control.stretch import PIECES_MAX, Piece, Stretch
+from thermoctl.control.pid.simc import Gains, Process, simc
+from thermoctl.control.pid.step_fit import step_fit
+from thermoctl.control.pid.stretch import PIECES_MAX, Piece, Stretch
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
 from thermoctl.signals import Beliefs

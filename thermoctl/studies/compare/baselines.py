@@ -1,6 +1,6 @@
 """Controllers from elsewhere, tuned for the rig as it was ordered.
 
-simple-pid, a package with many users, with gains by the SIMC rules of `thermoctl.control.simc`
+simple-pid, a package with many users, with gains by the SIMC rules of `thermoctl.control.pid.simc`
 from what is known of the nominal rig, and a law in the manner of Marlin's, which is in
 `thermoctl.studies.compare.marlin`.
 """
@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
-from thermoctl.control import simc as rules
+from thermoctl.control.pid import simc as rules
 from thermoctl.errors import Unavailable
 from thermoctl.plant.lab import LabParameters
 from thermoctl.plant.parameters import WATER_J_PER_KG_K, TankParameters

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from thermoctl.control.autotune import Found
-from thermoctl.control.simc import Gains
+from thermoctl.control.pid.autotune import Found
+from thermoctl.control.pid.simc import Gains
 from thermoctl.ranges import number
 
 SLOPE_MIN, SLOPE_MAX = 2e-5, 0.5

@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from thermoctl.control.autotune import Found, GivenUp
-from thermoctl.control.simc import Process, simc
-from thermoctl.control.step_fit import StepFit, step_fit
-from thermoctl.control.stretch import Piece, Stretch
+from thermoctl.control.pid.autotune import Found, GivenUp
+from thermoctl.control.pid.simc import Process, simc
+from thermoctl.control.pid.step_fit import StepFit, step_fit
+from thermoctl.control.pid.stretch import Piece, Stretch
 from thermoctl.ports import Situation
 
 BEGIN_BELOW_K = 3.0

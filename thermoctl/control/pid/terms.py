@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from thermoctl.control.simc import Gains
+from thermoctl.control.pid.simc import Gains
 
 TOLERANCE = 0.01
 """A converter rounds: only a power further from the one asked for was limited by somebody."""

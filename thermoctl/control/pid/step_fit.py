@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermoctl.control.simc import Process
-from thermoctl.control.stretch import Stretch
+from thermoctl.control.pid.simc import Process
+from thermoctl.control.pid.stretch import Stretch
 from thermoctl.quantities import Array
 
 _TOTALS = 34

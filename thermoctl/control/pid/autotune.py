@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from thermoctl.control.simc import Gains
+from thermoctl.control.pid.simc import Gains
 from thermoctl.ports import Situation
 
 FORGOTTEN_S, FORGOTTEN_PERIODS = 30.0, 5.0

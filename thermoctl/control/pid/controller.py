@@ -10,15 +10,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
-from thermoctl.control.autotune import AutoTune, Experiment, Found, GivenUp, Tuning
 from thermoctl.control.cooling import RATIO_MAX, RATIO_MIN, heat_of, power_for_heat
 from thermoctl.control.inexact import ahead, given
 from thermoctl.control.mirror import mirrored
-from thermoctl.control.pid_remembered import as_remembered, found_before
-from thermoctl.control.pid_terms import PidTerms, Terms
-from thermoctl.control.relay import RelayTest
-from thermoctl.control.simc import Gains
-from thermoctl.control.step_test import StepTest
+from thermoctl.control.pid.autotune import AutoTune, Experiment, Found, GivenUp, Tuning
+from thermoctl.control.pid.relay import RelayTest
+from thermoctl.control.pid.remembered import as_remembered, found_before
+from thermoctl.control.pid.simc import Gains
+from thermoctl.control.pid.step_test import StepTest
+from thermoctl.control.pid.terms import PidTerms, Terms
 from thermoctl.ports import Situation
 from thermoctl.quantities import is_finite_number
 from thermoctl.ranges import check_ranges, ranged

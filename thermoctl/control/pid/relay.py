@@ -22,9 +22,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from thermoctl.control.adaptive.evidence import Noise
-from thermoctl.control.autotune import Found, GivenUp
-from thermoctl.control.simc import Limit, Process, tyreus_luyben
-from thermoctl.control.stretch import Piece, Stretch
+from thermoctl.control.pid.autotune import Found, GivenUp
+from thermoctl.control.pid.simc import Limit, Process, tyreus_luyben
+from thermoctl.control.pid.stretch import Piece, Stretch
 from thermoctl.ports import Situation
 from thermoctl.quantities import Array, clamp
 
