@@ -162,6 +162,16 @@ def test_json_is_one_object_and_the_second_time_nothing_is_run(tmp_path):
     assert len((tmp_path / RESULTS).read_text().splitlines()) == 2
 
 
+def test_another_first_seed_is_another_plant(tmp_path):
+    arguments = ["--controller", "on-off", *BRIEF, "--out", tmp_path, "--json"]
+    usual = json.loads(run(*arguments).stdout)
+    fresh = json.loads(run(*arguments, "--first-seed", 300).stdout)
+    assert [each["conditions"]["first_seed"] for each in (usual, fresh)] == [0, 300]
+    assert usual["lines"] != fresh["lines"]
+    rows = [json.loads(row) for row in (tmp_path / RESULTS).read_text().splitlines()]
+    assert {row["seed"] for row in rows} == {0, 300}
+
+
 def test_a_run_on_a_lab_is_kept_with_its_bound_and_not_made_twice(tmp_path):
     arguments = ["--controller", "marlin-mpc", "--fleet", "tclab", *BRIEF, "--out", tmp_path]
     first, second = run(*arguments, "--json"), run(*arguments, "--json")

@@ -199,6 +199,13 @@ def _name(what: str, known: Sequence[str]) -> Parsed:
 @click.option(
     "--seeds", type=click.IntRange(min=1), help=f"Plants of each fleet; {_SEEDS} when not given."
 )
+@click.option(
+    "--first-seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of the first plant: from another one on, plants that nobody has looked at.",
+)
 @click.option("--quick", is_flag=True, help=f"Only {_QUICK_SEEDS} plants: a minute or so.")
 @click.option(
     "--nameplate", is_flag=True, help="Tell every model the gain that its litres and watts make."
@@ -227,6 +234,7 @@ def compare(
     fleets: Sequence[str],
     scenarios: Sequence[str],
     seeds: int | None,
+    first_seed: int,
     quick: bool,
     nameplate: bool,
     jobs: int | None,
@@ -244,7 +252,8 @@ def compare(
     count = seeds or (_QUICK_SEEDS if quick else _SEEDS)
     contenders = _contenders(texts, config, fleets, nameplate=nameplate)
     names = list(dict.fromkeys(each.name for each in contenders))
-    planned = jobs_for(contenders, dict.fromkeys(fleets), range(count), scenarios)
+    met = range(first_seed, first_seed + count)
+    planned = jobs_for(contenders, dict.fromkeys(fleets), met, scenarios)
     if not planned:
         raise click.UsageError(f"expected a scenario of {', '.join(fleets)}, got none of them")
     make_folder(out)
@@ -253,8 +262,9 @@ def compare(
     lines = summarise(results, names)
     _draw(lines, names, out)
     if as_json:
-        conditions = {"seeds": count, "nameplate": nameplate, "results": str(store.path)}
-        print_json({"lines": lines_as_json(lines), "conditions": conditions})
+        conditions = {"seeds": count, "first_seed": first_seed, "nameplate": nameplate}
+        told = {**conditions, "results": str(store.path)}
+        print_json({"lines": lines_as_json(lines), "conditions": told})
     else:
         print_table(console(), lines, names)
     missed = misses(lines, names[0]) if check else []
