@@ -1,7 +1,8 @@
 """Where a start takes up what the last run left: wishes and latches.
 
 A restarted loop is off unless its configuration says ``resume = true``. What is edited in the
-configuration since is a newer wish than what was stored, and counts as a first start.
+configuration since is a newer wish than what was stored, and counts as a first start. A record that
+cannot be read is not the same as none: somebody may have switched the loop off, so it is off.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from thermoctl.signals import Alarm, Cycle, Mode
 
 Emit = Callable[..., None]
 _HOW = "set resume = true, or edit mode, and start again"
+_HOW_NOW = "thermoctl mode auto"
 
 
 class Resumption:
@@ -45,7 +47,9 @@ class Resumption:
             record, warning = self._runs.load(name)
             if warning is not None:
                 self._emit("state.ignored", name, why=warning)
-            starts[name] = self._start(name, table, record)
+                starts[name] = self._unknown(name, table)
+            else:
+                starts[name] = self._start(name, table, record)
             loops[name] = self._exchanged(name, table, record)
         return started_as(settings.model_copy(update={"loops": loops}), starts)
 
@@ -60,6 +64,12 @@ class Resumption:
         )
         self._emit("controller.resumed", name, controller=exchanged.controller.kind)
         return exchanged
+
+    def _unknown(self, name: str, table: LoopTable) -> tuple[Mode, float]:
+        """Return how a loop starts of which a record is there, but cannot be read: off."""
+        if table.mode is not Mode.OFF:
+            self._emit("loop.not_resumed", name, was="unknown", to_resume=_HOW_NOW)
+        return Mode.OFF, table.setpoint_c
 
     def _start(self, name: str, table: LoopTable, record: RunRecord | None) -> tuple[Mode, float]:
         if record is None:

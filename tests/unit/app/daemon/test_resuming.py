@@ -140,4 +140,24 @@ def test_a_record_of_laws_that_is_none_is_ignored_with_a_warning(starts):
     (path,) = starts.folder.glob("run-*.json")
     path.write_text(path.read_text().replace('"adaptive",', "7,"))
     assert begun_laws(starts, **LAWS) == ("adaptive", "pid")
+    assert starts.told == ["state.ignored", "loop.not_resumed"]
+
+
+@pytest.mark.parametrize(
+    "content", ["", '{"format": 1, "cont', "[]"], ids=["empty", "torn", "list"]
+)
+@pytest.mark.parametrize("resume", [True, False])
+def test_a_wish_that_cannot_be_read_may_have_been_off(starts, content, resume):
+    starts.start(then=Seen(Mode.OFF, 30.0), resume=resume)
+    (path,) = starts.folder.glob("run-*.json")
+    path.write_text(content)
+    assert starts.start(resume=resume) == (Mode.OFF, 30.0)
+    assert starts.told == ["state.ignored", "loop.not_resumed"]
+
+
+def test_a_loop_that_begins_off_anyway_has_nothing_to_resume(starts):
+    starts.start(mode="off")
+    (path,) = starts.folder.glob("run-*.json")
+    path.write_text("")
+    assert starts.start(mode="off") == (Mode.OFF, 30.0)
     assert starts.told == ["state.ignored"]
