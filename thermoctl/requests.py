@@ -60,7 +60,8 @@ class ChooseController:
 class ChooseShadow:
     """Request: put `law`, a `Controller`, in the shadow; None: nobody.
 
-    It begins there with nothing learnt, and can be put in charge when it has seen enough.
+    It begins there with nothing learnt. It can be put in charge at any time: what it has learnt by
+    then is told by its beliefs and its score, and nothing checks that it is enough.
     """
 
     law: Any

@@ -168,4 +168,4 @@ class Exchange:
         try:
             return call()
         except LINK_ERRORS as error:
-            raise LinkError(f"expected a working link, got {error!r}") from error
+            raise LinkError(f"expected a working link, got {error}") from error

@@ -7,8 +7,8 @@ from typing import Final
 
 ADVICE: Final[Mapping[str, str]] = {
     "board.fault": "the board reports a fault of its own: look at its output and its supply",
-    "board.lost": "nothing talks to the board: look at cable, port and supply; it has switched off "
-    "by itself",
+    "board.lost": "nothing talks to the board: look at cable, port and supply; one with a dead-man "
+    "switches off by itself, any other may still be heating",
     "controller.failed": "the control law failed: the journal has the trace; start it anew",
     "cycle.failed": "the program failed in a cycle: the journal has the trace; start it anew",
     "estimator.failed": "learning failed: the journal has the trace; start it anew",

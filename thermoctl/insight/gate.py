@@ -28,4 +28,6 @@ class GateWatch:
             self._learnt_s = t_s
         if t_s < self._held_s:
             return Gate.HELD
+        if self._learnt_s == -math.inf:
+            return Gate.UNKNOWN
         return Gate.LEARNING if t_s - self._learnt_s < LINGERS_S else Gate.PAUSED

@@ -117,8 +117,12 @@ class Insights:
         self._moving = True
         self._faults.settle_anew()
         self._power = _Turn()
-        auto = step.mode is Mode.AUTO and step.state is State.RUN
-        why = "collecting: moved a moment ago" if auto else "not in mode auto"
+        if step.mode is not Mode.AUTO:
+            why = "not in mode auto"
+        elif step.state is not State.RUN:
+            why = f"nothing is judged in state {step.state}"
+        else:
+            why = "collecting: moved a moment ago"
         self._performance.forget(why)
         self._restless.begin()
 

@@ -109,7 +109,7 @@ def test_a_missing_reading_changes_nothing():
 
 def test_the_gate_says_learning_for_a_while_after_the_last_evidence():
     gate = GateWatch()
-    assert gate.after(0.0, PLANT) is Gate.PAUSED
+    assert gate.after(0.0, PLANT) is Gate.UNKNOWN
     assert gate.after(1.0, replace(PLANT, learning=True)) is Gate.LEARNING
     assert gate.after(20.0, PLANT) is Gate.LEARNING
     assert gate.after(40.0, PLANT) is Gate.PAUSED

@@ -12,7 +12,7 @@ from thermoctl.app.compose import loop_for
 from thermoctl.app.sim import bench_settings
 from thermoctl.insight import Gate, Insights
 from thermoctl.runtime.clock import SimulatedClock
-from thermoctl.signals import Measurement, Quality, SetPoint
+from thermoctl.signals import Measurement, Mode, Quality, SetPoint, State
 
 pytestmark = pytest.mark.slow  # together more than the quick subset can afford
 
@@ -71,6 +71,20 @@ def test_a_sample_without_a_reading_leaves_what_was_told():
     missing = Measurement(101.0, math.nan, Quality.MISSING)
     assert rig.watch.after(replace(step, t_s=101.0, measurement=missing), math.nan) == ()
     assert rig.watch.now is before
+
+
+@pytest.mark.parametrize(
+    ("mode", "state", "words"),
+    [
+        (Mode.OFF, State.RUN, "not in mode auto"),
+        (Mode.AUTO, State.LATCHED, "nothing is judged in state latched"),
+    ],
+)
+def test_why_nothing_is_judged_is_the_mode_or_the_state(mode, state, words):
+    rig = Rig()
+    rig.run(100.0)
+    rig.watch.after(replace(rig.steps[-1], t_s=101.0, mode=mode, state=state), 0.0)
+    assert rig.watch.now.performance.verdict == words
 
 
 def test_a_set_point_that_moves_before_anything_is_known_is_no_trouble():

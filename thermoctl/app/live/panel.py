@@ -26,6 +26,7 @@ _HEALTH = (items.inflation, items.white, items.deviation, items.tick)
 _FURTHER = (items.innovation, items.noise)
 
 _GATES = {
+    Gate.UNKNOWN: "nothing learnt yet",
     Gate.LEARNING: "learning",
     Gate.PAUSED: "learning paused: nothing to learn",
     Gate.HELD: "learning held: the water jumped",
