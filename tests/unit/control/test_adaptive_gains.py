@@ -101,6 +101,17 @@ def test_gains_that_are_kept_cannot_be_written_to(rested):
             array[...] = 0.0
 
 
+def test_a_sample_that_keeps_gains_shares_what_it_leaves_alone(rested):
+    pairs = [(a, b) for a, b in pairwise(rested[-150:]) if b.gains.kept > 0]
+    assert len(pairs) > 100
+    for before, after in pairs:
+        assert after.full is before.full
+        assert np.array_equal(after.block[:, X], after.x)
+        assert kept(before, after)
+        for array in (after.full, after.x, after.block):
+            assert not array.flags.writeable
+
+
 def test_a_missing_reading_has_them_reckoned_and_grows_the_covariance(rested):
     belief = rested[-1]
     blind = BANK.observe(belief, math.nan, HELD)

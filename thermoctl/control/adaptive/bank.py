@@ -16,7 +16,7 @@ import numpy as np
 
 from thermoctl.control.adaptive import evidence, filters, foretelling, path
 from thermoctl.control.adaptive.bank_belief import Ahead, BankBelief, Met, Twin
-from thermoctl.control.adaptive.coasting import outlook
+from thermoctl.control.adaptive.coasting import outlook, renewed
 from thermoctl.control.adaptive.constants import Hearing, Lags, Plants
 from thermoctl.control.adaptive.evidence import (
     EVIDENCE_FROM,
@@ -29,7 +29,7 @@ from thermoctl.control.adaptive.evidence import (
     Noise,
     Weights,
 )
-from thermoctl.control.adaptive.filters import T, X, Z
+from thermoctl.control.adaptive.filters import D, T, X, Z
 from thermoctl.control.adaptive.gains import Corrected, Gains, reckoned
 from thermoctl.control.adaptive.hypotheses import Hypotheses
 from thermoctl.control.adaptive.path import Path
@@ -150,7 +150,7 @@ class Bank:
         """Return what a period of `applied` makes of `belief`, whatever will be read."""
         power = clamp(applied, self.u_min, self.u_max)
         way = path.pushed(belief.path, self.hypotheses, power)
-        outlook, block = belief.outlook, belief.block
+        outlook, full, x = belief.outlook, belief.full, belief.x
         if outlook is None:
             memory_s = unrest = 0.0
         else:
@@ -159,14 +159,15 @@ class Bank:
             unrest = abs(power - outlook.holding_power)
         excitation = belief.excitation.after(power, self.period_s, memory_s, self.hearing)
         gains = None
-        if block is None or belief.blind * self.period_s > BLIND_S:
-            block = None
+        if full is None or x is None or belief.blind * self.period_s > BLIND_S:
+            full = x = None
         elif (gains := self._kept(belief, excitation, unrest)) is None:
-            block = self._predicted(block, way, belief.sample + 1, unrest)
+            full = self._predicted(filters.joined(full, x), way, belief.sample + 1, unrest)
+            x = full[:, X]
         else:
-            block = filters.moved(block, way.mean, self.constants)
+            x = filters.moved(x, way.mean, self.hypotheses, self.constants)
         twin = None if belief.twin is None else self.ahead(belief.twin.belief, applied)
-        return Ahead(excitation, way, unrest, block, gains, twin)
+        return Ahead(excitation, way, unrest, full, x, gains, twin)
 
     def _kept(self, belief: BankBelief, excitation: Excitation, unrest: float) -> Gains | None:
         """Return the gains if they can be kept for one more sample; None if they cannot."""
@@ -224,18 +225,22 @@ class Bank:
     def _met(self, belief: BankBelief, ahead: Ahead, y_c: float) -> BankBelief:
         """Return the belief after `y_c`, without a twin."""
         seen, way = math.isfinite(y_c), ahead.path
-        if belief.block is None and not seen:
+        if belief.full is None and not seen:
             return belief._replace(path=way, excitation=ahead.excitation)
         met = self._seen(belief, ahead, y_c) if seen else self._unseen(belief, ahead)
         weights = met.weights
         kept = ahead.gains is not None and met.gains is not None and weights is belief.weights
-        before = belief.outlook if kept else None
-        view = outlook(met.block, way, weights.share, self.hypotheses, self.constants, before)
-        # Where P is kept the means tell of all that is new: none of their weights is 0.
-        whole = met.surprise_k if kept else np.vdot(met.block, met.block)
+        always = way, weights.share, self.hypotheses, self.constants
+        if kept and belief.outlook is not None:
+            view = renewed(belief.outlook, met.x, *always)
+            whole = met.surprise_k  # it tells of all that is new: no weight is 0
+        else:
+            block = filters.joined(met.full, met.x)
+            view, whole = outlook(block, *always), float(np.vdot(block, block))
+            met.full.setflags(write=False)
         if not math.isfinite(whole + view.coasting_c):
             raise ArithmeticError(f"expected a finite belief after {y_c!r} degC")
-        for array in (met.block, *way):
+        for array in (met.x, *way):
             array.setflags(write=False)
         blind = 0 if seen else belief.blind + 1
         return BankBelief(belief.sample + 1, blind, ahead.excitation, way, *met, view)
@@ -280,48 +285,49 @@ class Bank:
         """Return what becomes of the prediction without a reading: for some time, the belief."""
         _, blind, _, _, noise, gate, weights, drifting, *_ = belief
         stands = (blind + 1) * self.period_s > BLIND_S
-        block = belief.block if stands or ahead.block is None else ahead.block
-        assert block is not None
-        return Met(noise, gate, weights, drifting, 0.0, math.nan, block)
+        full, x = (belief.full, belief.x) if stands or ahead.x is None else (ahead.full, ahead.x)
+        assert full is not None
+        assert x is not None
+        return Met(noise, gate, weights, drifting, 0.0, math.nan, full, x)
 
     def _seen(self, belief: BankBelief, ahead: Ahead, y_c: float) -> Met:
         """Return what becomes of the prediction when the reading `y_c` meets it."""
         sample, share = belief.sample + 1, ahead.excitation.share
-        drifting, block, m = belief.drifting, ahead.block, belief.weights.likeliest
-        nu = math.nan if block is None else y_c - block.item(Z, X, m)
+        drifting, m = belief.drifting, belief.weights.likeliest
+        block, x, gains = ahead.full, ahead.x, ahead.gains
+        nu = math.nan if x is None else y_c - x.item(Z, m)
         noise, weights = self._noise(belief, nu, y_c)
         if belief.noise.samples == 1 and self._misled(belief, block, y_c):
-            belief, noise, block = belief._replace(block=None), Noise().after(y_c), None
-        if block is None:
+            belief, noise, x = belief._replace(full=None), Noise().after(y_c), None
+        if block is None or x is None:
             block, surprise_k = self._begun(belief, ahead, y_c), math.nan
-            nu = y_c - block.item(Z, X, m)
+            x, nu = block[:, X], y_c - block.item(Z, X, m)
         else:
-            surprise_k = y_c - float(belief.weights.share.dot(block[Z, X]))
-        gains, still = ahead.gains, self._still(share, ahead.unrest)
+            surprise_k = y_c - float(belief.weights.share.dot(x[Z]))
+        still = self._still(share, ahead.unrest)
         S_m = block.item(Z, Z, m) + noise.believed if gains is None else gains.S.item(m)
         gate = self._gated(belief, nu, S_m)
         if gate.outlier:
-            return Met(noise, gate, weights, drifting, 0.0, surprise_k, block)
+            return Met(noise, gate, weights, drifting, 0.0, surprise_k, block, x)
         if sample >= drifting.silent_until:
             drifting = self._drifted(belief, still, nu / math.sqrt(S_m))
         if gate.jumped or drifting.found:
+            block = filters.joined(block, x)
             block, drifting, gains = self._disturbed(belief, block, gate, nu, noise.believed)
         if gains is not None:
-            block = filters.followed(block, y_c, gains.K, self.constants)
-            return Met(
-                noise, gate, weights, drifting, 0.0, surprise_k, block, gains.older(kept=True)
-            )
+            x, gains = filters.followed(x, y_c, gains.K, self.constants), gains.older(kept=True)
+            return Met(noise, gate, weights, drifting, 0.0, surprise_k, block, x, gains)
         heard, before = self._heard(sample, share, noise, gate, drifting), block
         block, nis, S = filters.corrected(block, y_c, noise.believed, self.constants, share)
         if sample < gate.silent_until:  # what was poured in is colder, and loses less
-            filters.grown(block, block[T, X] - before[T, X], self.constants)
+            filters.grown(block[D, X], block[T, X] - before[T, X], self.constants)
         self._limit(block, sample)
         gains = self._gains(belief, Corrected(before, block, S), drifting, still=still)
         if heard > 0.0:
             weights = weights.after(heard, nis, S)
         elif sample < gate.silent_until and not gate.jumped:
             weights = weights.among_shapes(nis, S)
-        return Met(noise, gate, weights, drifting, heard, surprise_k, block, gains)
+        return Met(noise, gate, weights, drifting, heard, surprise_k, block, block[:, X], gains)
 
     def _limit(self, block: filters.Block, sample: int) -> None:
         """Limit the gain and, as soon as that is known, the loss; in place."""
@@ -347,7 +353,7 @@ class Bank:
         gains = None if belief.gains is None else belief.gains.older(kept=False)
         if not still or drifting.disturbed or (gains is not None and gains.fresh):
             return gains
-        return reckoned(gains, step, belief.block, belief.weights, self.constants)
+        return reckoned(gains, step, belief.full, belief.weights, self.constants)
 
     def _drifted(self, belief: BankBelief, still: bool, sds: float) -> Drifting:
         """Return the sums after an innovation of so many standard deviations."""

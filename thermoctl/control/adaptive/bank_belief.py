@@ -10,6 +10,7 @@ from thermoctl.control.adaptive.coasting import Outlook
 from thermoctl.control.adaptive.evidence import Drifting, Excitation, Gate, Noise, Weights
 from thermoctl.control.adaptive.gains import Gains
 from thermoctl.control.adaptive.path import Path
+from thermoctl.quantities import Array
 
 
 class BankBelief(NamedTuple):
@@ -34,8 +35,10 @@ class BankBelief(NamedTuple):
     surprise_k : float
         The last reading less what the hypotheses expected, weighted as they were before it; NaN
         where there was no reading, or nothing to expect.
-    block : ndarray, shape (4, 5, n) or None
-        The filters; None before the first valid reading.
+    full : ndarray, shape (4, 5, n) or None
+        The filters after the last full sample; None before the first valid reading.
+    x : ndarray, shape (4, n) or None
+        Their states. They lie in `full`, unless gains have been kept since.
     gains : Gains or None
         Those of the filters in the last rest; None before it, and where more than power has moved
         since.
@@ -57,11 +60,18 @@ class BankBelief(NamedTuple):
     drifting: Drifting
     heard: float = 0.0
     surprise_k: float = math.nan
-    block: filters.Block | None = None
+    full: filters.Block | None = None
+    x: Array | None = None
     gains: Gains | None = None
     outlook: Outlook | None = None
     prior: filters.Prior = filters.UNKNOWN
     twin: Twin | None = None
+
+    @property
+    def block(self) -> filters.Block | None:
+        """The filters of this sample: those of `full`, with the states of now."""
+        full, x = self.full, self.x
+        return None if full is None or x is None else filters.joined(full, x)
 
 
 class Twin(NamedTuple):
@@ -97,10 +107,13 @@ class Ahead(NamedTuple):
         As in the belief to come.
     unrest : float
         How far the power was from what holds the water; 0 while that is not known.
-    block : ndarray, shape (4, 5, n) or None
-        The filters; None where nothing is foreseen, at the start or after a long gap.
+    full : ndarray, shape (4, 5, n) or None
+        The filters; None where nothing is foreseen, at the start or after a long gap. With gains
+        that are kept those of the belief, as P is what it was.
+    x : ndarray, shape (4, n) or None
+        The states foreseen.
     gains : Gains or None
-        Those that are kept; then P is what it was. None where they are to be reckoned.
+        Those that are kept; None where they are to be reckoned.
     twin : Ahead or None
         The same of the twin.
     """
@@ -108,7 +121,8 @@ class Ahead(NamedTuple):
     excitation: Excitation
     path: Path
     unrest: float
-    block: filters.Block | None
+    full: filters.Block | None
+    x: Array | None
     gains: Gains | None = None
     twin: Ahead | None = None
 
@@ -122,5 +136,6 @@ class Met(NamedTuple):
     drifting: Drifting
     heard: float
     surprise_k: float
-    block: filters.Block
+    full: filters.Block
+    x: Array
     gains: Gains | None = None

@@ -86,46 +86,67 @@ class Outlook(NamedTuple):
 
 
 def outlook(
-    block: Block,
+    block: Block, path: Path, share: Array, hypotheses: Hypotheses, constants: PerPeriod
+) -> Outlook:
+    """Return the means over the hypotheses, weighted by `share`."""
+    h, mean, beta = hypotheses.period_s, share.dot, block[BETA, X]
+    coasting_c, holding_power, surplus, spread_k = _coming(
+        block[:, X], path, share, hypotheses, constants
+    )
+    lag_s = float(mean(hypotheses.lag_s))
+    return Outlook(  # in the order of its fields: by their names it would take twice as long
+        coasting_c,
+        holding_power,
+        lag_s,
+        float(mean(beta)) / h,
+        float(mean(hypotheses.element * beta)),
+        surplus,
+        spread_k,
+        math.sqrt(float(mean(block[BETA, BETA]))) / h,
+        math.sqrt(max(float(mean(hypotheses.lag_squared)) - lag_s * lag_s, 0.0)),
+        1.0 / float(mean(hypotheses.lag_inverse)),
+    )
+
+
+def renewed(
+    before: Outlook,
+    x: Array,
     path: Path,
     share: Array,
     hypotheses: Hypotheses,
     constants: PerPeriod,
-    before: Outlook | None = None,
 ) -> Outlook:
-    """Return the means over the hypotheses, weighted by `share`.
-
-    From one `before`, of the same weights and P, is taken what depends on nothing else.
-    """
-    h, mean = hypotheses.period_s, share.dot
-    d, beta = block[D, X], block[BETA, X]
-    holding = np.minimum(np.maximum(d / beta, constants.power_min), constants.power_max)
-    coasting = path.under_way - hypotheses.held * holding
-    coasting *= beta
-    coasting += block[T, X]
-    coasting_c, holding_power = float(mean(coasting)), float(mean(holding))
-    coasting *= coasting
-    variance = float(mean(coasting)) - coasting_c * coasting_c
-    if before is None:
-        gain, heater_k = float(mean(beta)) / h, float(mean(hypotheses.element * beta))
-        lag_s = float(mean(hypotheses.lag_s))
-        gain_sd = math.sqrt(float(mean(block[BETA, BETA]))) / h
-        lag_sd_s = math.sqrt(max(float(mean(hypotheses.lag_squared)) - lag_s * lag_s, 0.0))
-        lag_harmonic_s = 1.0 / float(mean(hypotheses.lag_inverse))
-    else:
-        _, _, lag_s, gain, heater_k, _, _, gain_sd, lag_sd_s, lag_harmonic_s = before
-    return Outlook(  # in the order of its fields: by their names it would take twice as long
+    """Return the outlook from the states `x`; weights and P are as `before`."""
+    coasting_c, holding_power, surplus, spread_k = _coming(x, path, share, hypotheses, constants)
+    _, _, lag_s, gain, heater_k, _, _, gain_sd, lag_sd_s, lag_harmonic_s = before
+    return Outlook(
         coasting_c,
         holding_power,
         lag_s,
         gain,
         heater_k,
-        float(mean(path.heat)) - holding_power,
-        math.sqrt(max(variance, 0.0)),
+        surplus,
+        spread_k,
         gain_sd,
         lag_sd_s,
         lag_harmonic_s,
     )
+
+
+def _coming(
+    x: Array, path: Path, share: Array, hypotheses: Hypotheses, constants: PerPeriod
+) -> tuple[float, float, float, float]:
+    """Return what is new at every sample: coasting_c, holding_power, surplus and spread_k."""
+    mean, d, beta = share.dot, x[D], x[BETA]
+    holding = np.minimum(np.maximum(d / beta, constants.power_min), constants.power_max)
+    coasting = path.under_way - hypotheses.held * holding
+    coasting *= beta
+    coasting += x[T]
+    coasting_c, holding_power = float(mean(coasting)), float(mean(holding))
+    coasting *= coasting
+    variance = float(mean(coasting)) - coasting_c * coasting_c
+    surplus = float(mean(path.heat)) - holding_power
+    return coasting_c, holding_power, surplus, math.sqrt(max(variance, 0.0))
 
 
 def power_for(

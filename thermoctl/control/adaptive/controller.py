@@ -206,7 +206,7 @@ class Adaptive:
     def _sds(self, bank: BankBelief, memory: Memory) -> Sds:
         """Return how well gain and holding power are known; on trial no better than when new."""
         gain_sd, rival = gain(self.bank, bank)[1], memory.rival
-        if rival is not None and rival.block is not None:
+        if rival is not None and rival.full is not None:
             gain_sd = max(gain_sd, gain(self.bank, rival)[1])
         return Sds(gain_sd, holding_power_sd(bank))
 
@@ -280,7 +280,7 @@ def _due(bank: BankBelief) -> bool:
     gains = bank.gains
     if gains is not None and gains.settled:
         return gains.age == 0
-    return bank.block is not None and bank.sample % SDS_EVERY == 0
+    return bank.full is not None and bank.sample % SDS_EVERY == 0
 
 
 def _doubt(outlook: Outlook | None, plants: Plants) -> str:

@@ -2,8 +2,9 @@ r"""A Kalman filter for every hypothesis, all in one array.
 
 The state is :math:`x = (T, z, d, \beta)`: water and sensor in degC, loss and gain in K per period,
 without power and from full power. A block holds ``[P | x]``, shape (4, 5, n), so that what is done
-to the rows of P is done to x in the same breath. `loosened` and `project` change the block they
-are given, all other functions return a new one.
+to the rows of P is done to x in the same breath. Where gains are kept P stays as it is, and the
+states x go on in an array of their own, shape (4, n): `moved` and `followed`. What changes the
+block it is given says so, all other functions return a new one.
 
 P is symmetric to the last bit, since each pair of elements is made by the same operations on equal
 numbers; no second pass is needed (``test_covariances_stay_symmetric_to_the_last_bit``).
@@ -181,7 +182,7 @@ def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0
     after, a, c = block.copy(), constants.step, constants.soon
     water, sensor = after[T], after[Z]
     warming = _carried(water, sensor, block[D], block[BETA], heat, a, c)  # F [P | x]
-    grown(after, warming[X], constants)
+    grown(after[D, X], warming[X], constants)
     TT, ZT, ZZ = water[T], sensor[T], sensor[Z]
     towards = ZT - ZZ
     towards *= a[Z]
@@ -206,12 +207,12 @@ def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0
     return after
 
 
-def moved(block: Block, heat: Array, constants: PerPeriod) -> Block:
-    """Return the block one period later as `predicted` does, but with P as it is."""
-    after = block.copy()
-    water, sensor, d, beta = after[T, X], after[Z, X], after[D, X], after[BETA, X]
-    warming = _carried(water, sensor, d, beta, heat, constants.step[X], constants.soon[X])
-    grown(after, warming, constants)
+def moved(x: Array, heat: Array, hypotheses: Hypotheses, constants: PerPeriod) -> Array:
+    """Return the states, shape (4, n), one period later as `predicted` does."""
+    after, a, c = x.copy(), hypotheses.sensor_step, hypotheses.sensor_soon
+    d = after[D]
+    warming = _carried(after[T], after[Z], d, after[BETA], heat, a, c)
+    grown(d, warming, constants)
     return after
 
 
@@ -229,14 +230,13 @@ def _carried(
     return warming
 
 
-def grown(block: Block, moved_k: Array, constants: PerPeriod) -> None:
-    """Let the loss go with water that has moved by `moved_k`, in place.
+def grown(loss: Array, moved_k: Array, constants: PerPeriod) -> None:
+    """Let the `loss` d go with water that has moved by `moved_k`, in place.
 
     As d' = d + max(d, 0) tanh(moved / 40 K), which keeps its sign and cannot run away, however long
     a period is. P is left as it is: beside the noise of d that is little. So is water that gains
     heat from a warmer room: only who heats and cools has it.
     """
-    loss = block[D, X]
     grows = np.tanh(moved_k * constants.per_room_k)
     grows *= np.maximum(loss, constants.no_loss)
     loss += grows
@@ -315,16 +315,26 @@ def corrected(
     return after, nu * nu, S
 
 
-def followed(block: Block, y_c: float, K: Array, constants: PerPeriod) -> Block:
-    """Return the block after reading `y_c`, the states corrected by the gains `K`.
+def followed(x: Array, y_c: float, K: Array, constants: PerPeriod) -> Array:
+    """Return the states after reading `y_c`, corrected by the gains `K`.
 
-    Of all limits only the one below which a gain is none is kept: the next full sample has others.
+    All are of shape (4, n). Of all limits only the one below which a gain is none is kept: the next
+    full sample has others.
     """
-    after = block.copy()
-    x = after[:, X]
-    x += K * (y_c - x[Z])
-    beta = x[BETA]
+    after: Array = K * (y_c - x[Z])
+    after += x
+    beta = after[BETA]
     np.maximum(beta, constants.gain_min, out=beta)
+    return after
+
+
+def joined(block: Block, x: Array) -> Block:
+    """Return `block` with the states `x`, shape (4, n); itself, if they lie in it."""
+    if x.base is block:
+        return block
+    after = block.copy()
+    after[:, X] = x
+    after.setflags(write=False)
     return after
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from thermoctl.control.adaptive.bank_belief import Ahead, BankBelief, Twin
 from thermoctl.control.adaptive.evidence import Weights
-from thermoctl.control.adaptive.filters import X, Z
+from thermoctl.control.adaptive.filters import Z
 
 
 def of_reading(
@@ -23,11 +23,11 @@ def of_reading(
     :math:`\ln \sum_j w_j \, S_j^{-1/2} e^{-\min(\nu_j^2/S_j,\,m^2)/2}`, where m is `most_sds`.
     Where nothing was foreseen, or `y_c` is NaN, it is 0.
     """
-    block, gains = ahead.block, ahead.gains
-    if block is None or not math.isfinite(y_c):
+    full, x, gains = ahead.full, ahead.x, ahead.gains
+    if full is None or x is None or not math.isfinite(y_c):
         return 0.0, weights
-    nu = y_c - block[Z, X]
-    S = block[Z, Z] + belief.noise.believed if gains is None else gains.S
+    nu = y_c - x[Z]
+    S = full[Z, Z] + belief.noise.believed if gains is None else gains.S
     nis = np.minimum(nu * nu / S, most_sds**2)
     log = weights.log - 0.5 * (np.log(S) + nis)
     most = float(log.max())

@@ -28,7 +28,7 @@ def plant_belief(bank: Bank, belief: BankBelief, sign: float = 1.0) -> PlantBeli
     sign : float
         -1 where temperatures were negated because power cools.
     """
-    if belief.block is None or belief.outlook is None:
+    if belief.full is None or belief.outlook is None:
         return None
     outlook = belief.outlook
     _, gain_sd = gain(bank, belief)
@@ -63,8 +63,8 @@ def gain(bank: Bank, belief: BankBelief) -> tuple[float, float]:
 
 def holding_power_sd(belief: BankBelief) -> float:
     """Return the standard deviation of the holding power d/beta, by linearisation."""
-    assert belief.block is not None
     block, share = belief.block, belief.weights.share
+    assert block is not None
     beta = block[BETA, X]
     power = block[D, X] / beta
     squares = block[BETA, BETA] * power
@@ -79,10 +79,11 @@ def holding_power_sd(belief: BankBelief) -> float:
 
 def _mixed(bank: Bank, belief: BankBelief, state: int) -> tuple[float, float]:
     """Return mean and standard deviation of a rate over the hypotheses, in K/s."""
-    assert belief.block is not None
-    share, each = belief.weights.share, belief.block[state, X]
+    block, share = belief.block, belief.weights.share
+    assert block is not None
+    each = block[state, X]
     mean = float(share.dot(each))
-    squares = float(share.dot(each * each + belief.block[state, state]))
+    squares = float(share.dot(each * each + block[state, state]))
     return mean / bank.period_s, _spread(squares, mean) / bank.period_s
 
 
