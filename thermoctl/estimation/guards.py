@@ -61,12 +61,13 @@ class GuardedEstimate(Stacked):
     Parameters
     ----------
     excitation : float
-        Root mean square distance of recent regressors from their mean, in the units of phi.
+        Root mean square distance of recent regressors from their mean, in the units of phi; NaN
+        without an `excitation_min`, for which alone it is reckoned.
     R2 : float
         Noise variance the last update used; NaN where the law has none.
     """
 
-    excitation: float = 0.0
+    excitation: float = math.nan
     R2: float = math.nan
     _memory: _Memory | None = field(default=None, repr=False)
 
@@ -143,10 +144,11 @@ class Guarded:
         if learned is None:
             return replace(before, rejected=True)
         memory = self._remembered(before._memory, known, phi, y)
-        excitation = math.sqrt(memory.spread_squared)
+        least = self.excitation_min
+        excitation = math.nan if least is None else math.sqrt(memory.spread_squared)
         R2 = getattr(law, "R2", math.nan)
         rows, e, S, inflation = learned
-        paused = self.excitation_min is not None and excitation < self.excitation_min
+        paused = least is not None and excitation < least
         if paused:
             theta, P, stacked, inflation = before.theta, before.P, before.rows, 1.0
         else:
@@ -182,10 +184,11 @@ class Guarded:
 
     def _remembered(self, memory: _Memory | None, rows: Array, phi: Array, y: float) -> _Memory:
         """Return the memory after a usable sample; it begins with the stack `rows`."""
-        values = phi.tolist()
         if memory is None:
-            memory = _Memory(tuple(values), 0.0, self._parallel(rows))
-        phi_mean, spread_squared = _moved(memory, values)
+            memory = _Memory(tuple(phi.tolist()), 0.0, self._parallel(rows))
+        phi_mean, spread_squared = memory.phi_mean, memory.spread_squared
+        if self.excitation_min is not None:
+            phi_mean, spread_squared = _moved(memory, phi.tolist())
         if not self.robust_R2:
             return _Memory(phi_mean, spread_squared, memory.parallel)
         parallel, newest = _learned(memory.parallel, phi, y)

@@ -79,12 +79,17 @@ def test_a_paused_sample_still_tells_its_innovation():
 
 
 def test_excitation_is_the_spread_of_the_regressor():
-    rng, law = np.random.default_rng(6), Guarded(RecursiveLeastSquares())
+    rng, law = np.random.default_rng(6), Guarded(RecursiveLeastSquares(), excitation_min=1.0)
     belief, seen = start(2), []
     for _ in range(3000):
         belief = law.update(belief, 40.0 + rng.normal(size=2) * [3.0, 4.0], 0.0)
         seen.append(belief.excitation**2)
     assert np.mean(seen[500:]) == pytest.approx(25.0, rel=0.1)
+
+
+def test_excitation_is_not_reckoned_for_nobody():
+    belief = Guarded(RecursiveLeastSquares()).update(start(1), np.ones(1), 1.0)
+    assert math.isnan(belief.excitation)
 
 
 def jumping_pole(runs):
