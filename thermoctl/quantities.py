@@ -33,6 +33,12 @@ def is_finite_number(value: Any) -> bool:
         return False
 
 
+def frozen(values: Array) -> Array:
+    """Return `values` after making the array read-only."""
+    values.setflags(False)  # type: ignore[call-arg]  # `write`: by its name it takes twice as long
+    return values
+
+
 def clamp(value: float, low: float, high: float) -> float:
     """Return `value` limited to [low, high]; NaN becomes `low`, the safe end."""
     if not value >= low:  # written so that NaN fails too

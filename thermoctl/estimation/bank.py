@@ -23,12 +23,12 @@ import numpy as np
 import numpy.typing as npt
 
 from thermoctl.estimation.batch import advance, usable
-from thermoctl.estimation.belief import LARGEST, frozen, positive, scalar, shown
+from thermoctl.estimation.belief import LARGEST, positive, scalar, shown
 from thermoctl.estimation.identifier import pushed
 from thermoctl.estimation.kalman import RandomWalkKalman
 from thermoctl.estimation.recursion import drift, identity
 from thermoctl.model.arx import Arx
-from thermoctl.quantities import Array, is_finite_number
+from thermoctl.quantities import Array, frozen, is_finite_number
 
 PAST_LIMIT = math.sqrt(LARGEST)
 """No sample beyond this enters the past: with one a regressor might never be usable again."""

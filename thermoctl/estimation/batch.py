@@ -15,11 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from thermoctl.estimation.batch_one import run_one
-from thermoctl.estimation.belief import LARGEST, floats, frozen, sane, start
+from thermoctl.estimation.belief import LARGEST, floats, sane, start
 from thermoctl.estimation.kalman import CorrectedKalman
 from thermoctl.estimation.recursion import ARRAYS, RecursiveLaw, drift
 from thermoctl.estimation.stack import stack
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, frozen
 from thermoctl.signals import Estimate
 
 

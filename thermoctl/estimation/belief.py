@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from thermoctl.quantities import Array, is_finite_number
+from thermoctl.quantities import Array, frozen, is_finite_number
 from thermoctl.signals import Estimate
 
 LARGEST = 1e50
@@ -45,12 +45,6 @@ def start(n: int, P0: float | npt.ArrayLike = 1.0, theta0: npt.ArrayLike | None 
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
         raise ValueError(f"n must be a positive integer, got {n!r}")
     return Estimate(_parameters("theta0", theta0, int(n)), covariance("P0", P0, int(n)))
-
-
-def frozen(values: Array) -> Array:
-    """Return `values` after making the array read-only."""
-    values.setflags(write=False)
-    return values
 
 
 def covariance(name: str, value: float | npt.ArrayLike, n: int | None = None) -> Array:

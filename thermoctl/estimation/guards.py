@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thermoctl.estimation.belief import LARGEST, frozen, positive, scalar, truth
+from thermoctl.estimation.belief import LARGEST, positive, scalar, truth
 from thermoctl.estimation.kalman import CorrectedKalman, RandomWalkKalman
 from thermoctl.estimation.least_squares import RecursiveLeastSquares
 from thermoctl.estimation.recursion import RecursiveLaw, regressor
 from thermoctl.estimation.stack import Stacked, stack, stacked_one
 from thermoctl.filling import quickly_filled
-from thermoctl.quantities import Array, clamp
+from thermoctl.quantities import Array, clamp, frozen
 from thermoctl.signals import Estimate
 
 EXCITATION_MEMORY = 50

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from thermoctl.estimation.belief import frozen, scalar, start
+from thermoctl.estimation.belief import scalar, start
 from thermoctl.filling import quickly_filled
 from thermoctl.model.arx import Structure
 from thermoctl.ports import Estimator
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, frozen
 from thermoctl.signals import Estimate
 
 

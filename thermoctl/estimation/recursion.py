@@ -27,17 +27,9 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from thermoctl.estimation.belief import (
-    LARGEST,
-    covariance,
-    floats,
-    frozen,
-    numbers,
-    scalar,
-    shown,
-)
+from thermoctl.estimation.belief import LARGEST, covariance, floats, numbers, scalar, shown
 from thermoctl.estimation.stack import Learned, LearnedOne, stack, stacked_one, unstacked
-from thermoctl.quantities import Array, is_finite_number
+from thermoctl.quantities import Array, frozen, is_finite_number
 from thermoctl.signals import Estimate
 
 V = TypeVar("V", float, Array)

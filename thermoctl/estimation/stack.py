@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from thermoctl.filling import quickly_filled
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, frozen
 from thermoctl.signals import Estimate
 
 Learned = tuple[Array, float, float, float]
@@ -58,8 +58,7 @@ def stacked_one(theta: float, P: float) -> Array:
     """Return the stack of one parameter, read-only."""
     rows = np.empty((2, 1))
     rows[0, 0], rows[1, 0] = theta, P
-    rows.setflags(write=False)
-    return rows
+    return frozen(rows)
 
 
 def unstacked(learned: Learned) -> Stacked:

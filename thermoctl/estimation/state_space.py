@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from thermoctl.estimation.belief import LARGEST, bounded, covariance, floats, frozen
-from thermoctl.quantities import Array
+from thermoctl.estimation.belief import LARGEST, bounded, covariance, floats
+from thermoctl.quantities import Array, frozen
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,8 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from thermoctl.estimation import LainiotisBank, Order
-from thermoctl.estimation.belief import frozen
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, frozen
 from thermoctl.studies.record import Record
 from thermoctl.studies.scaled import Scaling, check_P0, check_R2
 from thermoctl.studies.wide import WideModel, fit_wide

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermoctl.estimation.belief import frozen
 from thermoctl.model.arx import Arx
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, frozen
 from thermoctl.studies.record import Record, RecordError
 from thermoctl.studies.scaled import Scaled, robust_variance
 

@@ -33,7 +33,7 @@ from thermoctl.control.adaptive.filters import D, T, X, Z
 from thermoctl.control.adaptive.gains import Corrected, Gains, reckoned
 from thermoctl.control.adaptive.hypotheses import Hypotheses
 from thermoctl.control.adaptive.path import Path
-from thermoctl.quantities import Array, clamp, is_finite_number
+from thermoctl.quantities import Array, clamp, frozen, is_finite_number
 
 LOSS_FROM_S = 60.0
 """The loss is limited by the gain from then on: before, the gain is hardly known."""
@@ -237,11 +237,11 @@ class Bank:
         else:
             block = filters.joined(met.full, met.x)
             view, whole = outlook(block, *always), float(np.vdot(block, block))
-            met.full.setflags(write=False)
+            frozen(met.full)
         if not math.isfinite(whole + view.coasting_c):
             raise ArithmeticError(f"expected a finite belief after {y_c!r} degC")
         for array in (met.x, *way):
-            array.setflags(write=False)
+            frozen(array)
         blind = 0 if seen else belief.blind + 1
         return BankBelief(belief.sample + 1, blind, ahead.excitation, way, *met, view)
 

@@ -185,7 +185,7 @@ class Adaptive:
         given_s = belief.given_s + applied * interval_s
         bank, memory, gathered = belief.bank, belief.memory, belief.since_s > 0.0
         power = given_s / since_s if gathered else applied
-        if interval_s > max(UNKNOWN_S, UNKNOWN_PERIODS * h):
+        if interval_s > UNKNOWN_S and interval_s > UNKNOWN_PERIODS * h:
             bank, memory = trial.lost(self.bank, bank, memory)
             behind_s, power, gathered = h, 0.0, True
         periods = math.floor(behind_s / h + 0.5)
@@ -215,7 +215,7 @@ class Adaptive:
         outlook, setpoint_c = belief.bank.outlook, situation.setpoint_c
         if outlook is None or not math.isfinite(setpoint_c):
             return belief, math.nan
-        before = float(belief.bank.path.powers[0])
+        before = belief.bank.path.powers.item(0)
         bounds, r_c, ramp_heat = self.bank.bounds, self._sign * setpoint_c, 0.0
         if situation.setpoint_rate_k_per_s != 0.0:
             rate = self._sign * situation.setpoint_rate_k_per_s

@@ -13,7 +13,7 @@ import numpy as np
 from thermoctl.control.adaptive.colour import WHITE, Colour
 from thermoctl.control.adaptive.constants import Hearing
 from thermoctl.control.adaptive.hypotheses import SHAPES, Hypotheses
-from thermoctl.quantities import Array, clamp
+from thermoctl.quantities import Array, clamp, frozen
 
 USUAL = Hearing()
 GATE_SAMPLES = 20
@@ -309,16 +309,9 @@ def weighted(log: Array) -> Weights:
     np.maximum(log, FLOOR, out=log)
     share = np.exp(log)
     share /= share.sum()
-    return _read_only(Weights(log, share, likeliest))
+    return Weights(frozen(log), frozen(share), likeliest)
 
 
 def equal(hypotheses: Hypotheses) -> Weights:
     """Return the weights before any evidence."""
     return weighted(np.zeros(len(hypotheses)))
-
-
-def _read_only(weights: Weights) -> Weights:
-    """Return `weights` after making both arrays read-only."""
-    weights.log.setflags(write=False)
-    weights.share.setflags(write=False)
-    return weights

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from thermoctl.control.adaptive.constants import Plants
 from thermoctl.control.adaptive.hypotheses import Hypotheses
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, frozen
 
 Block = Array
 T, Z, D, BETA = range(4)
@@ -334,8 +334,7 @@ def joined(block: Block, x: Array) -> Block:
         return block
     after = block.copy()
     after[:, X] = x
-    after.setflags(write=False)
-    return after
+    return frozen(after)
 
 
 def gains_at_rest(block: Block, S: Array, known: npt.NDArray[np.bool_]) -> Array:

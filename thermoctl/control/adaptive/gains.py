@@ -15,7 +15,7 @@ from typing import NamedTuple
 from thermoctl.control.adaptive import filters
 from thermoctl.control.adaptive.evidence import Weights
 from thermoctl.control.adaptive.filters import Block, D, PerPeriod
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, frozen
 
 GOOD_SAMPLES = 14
 """For so many samples after the one that reckoned them gains are good, once they have settled."""
@@ -81,8 +81,8 @@ def reckoned(
     K = filters.gains_at_rest(step.predicted, S, known)
     if before is not None and before.kept and last is not None:
         K[D] *= filters.caught_up(step.block, last, before.kept)
-    for array in (K, S):
-        array.setflags(write=False)
+    frozen(K)
+    frozen(S)
     if before is None:
         return Gains(K, S)
     m = weights.likeliest

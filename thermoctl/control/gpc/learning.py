@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from thermoctl.control.gpc.model import ChangeModel
-from thermoctl.quantities import Array, clamp
+from thermoctl.quantities import Array, clamp, frozen
 
 POLE_START = 0.3
 """First guess of one pole beside the one at 1; a third would begin at 0."""
@@ -119,8 +119,8 @@ class Learner:
         sd[:poles] = POLE_SD
         sd[model.inputs] = GAIN_SD * self.gain_k / model.m
         sd[-1] = LOSS_SD * self.gain_k
-        object.__setattr__(self, "_first", Learnt(_frozen(theta), _frozen(np.diag(sd * sd))))
-        object.__setattr__(self, "_cap", _frozen(sd * sd))
+        object.__setattr__(self, "_first", Learnt(frozen(theta), frozen(np.diag(sd * sd))))
+        object.__setattr__(self, "_cap", frozen(sd * sd))
 
     @property
     def gain_min_k(self) -> float:
@@ -181,8 +181,8 @@ class Learner:
             raise ArithmeticError(f"expected a finite model after a change of {change_k!r} K")
         return replace(
             belief,
-            theta=_frozen(learnt),
-            P=_frozen(P),
+            theta=frozen(learnt),
+            P=frozen(P),
             noise=_followed(noise, e, belief.samples),
             excited=excited,
         )
@@ -286,8 +286,3 @@ def _of_lags(a: list[float], slowest: float) -> list[float]:
         return a
     fast, slow = clamp(fast, 0.0, slowest), clamp(slow, 0.0, slowest)
     return [-(fast + slow), fast * slow]
-
-
-def _frozen(values: Array) -> Array:
-    values.setflags(write=False)
-    return values

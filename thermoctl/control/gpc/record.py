@@ -13,11 +13,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, frozen
 
 
 def _empty() -> Array:
-    return _frozen(np.empty(0))
+    return frozen(np.empty(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +48,7 @@ class Record:
     @classmethod
     def begun(cls, length: int, reading_c: float, power: float) -> Record:
         """Return the record of a plant that rested at `reading_c` under `power`."""
-        return cls(_frozen(np.full(length, reading_c)), _frozen(np.full(length, power)), 1)
+        return cls(frozen(np.full(length, reading_c)), frozen(np.full(length, power)), 1)
 
     @property
     def has_begun(self) -> bool:
@@ -93,9 +93,4 @@ def _pushed(values: Array, newest: float) -> Array:
     pushed = np.empty_like(values)
     pushed[0] = newest
     pushed[1:] = values[:-1]
-    return _frozen(pushed)
-
-
-def _frozen(values: Array) -> Array:
-    values.setflags(write=False)
-    return values
+    return frozen(pushed)
