@@ -266,21 +266,7 @@ class SimulatedBoard:
 
     def truth(self) -> Mapping[str, float]:
         """Return what no sensor sees, as of the last read or write."""
-        tank, heat = self._tank, self._tank.heat
-        temperatures = tank.temperatures
-        return {
-            "true_temperature_c": temperatures.bulk_c,
-            "sensor_c": tank.sensor_c,
-            "element_c": temperatures.element_c,
-            "still_c": temperatures.still_c,
-            "heater_w": tank.heater_w,
-            "cooled_w": tank.cooled_w,
-            "ice_kg": heat.bath_ice_kg + heat.ice_kg,
-            "water_kg": heat.water_kg,
-            "mains": tank.stage.mains,
-            "stirred": float(tank.stirred),
-            "energy_j": heat.electric_j,
-        }
+        return self._tank.truth()
 
     def disturb(self, name: str, amount: float | None = None) -> str:
         """Start the disturbance `name`, one of `DISTURBANCES` of the plant.

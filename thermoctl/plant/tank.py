@@ -95,6 +95,24 @@ class Tank:
         """Every temperature of the tank in degC."""
         return thermal.temperatures(self._k, self._heat)
 
+    def truth(self) -> dict[str, float]:
+        """Return what no sensor sees, by name."""
+        heat = self._heat
+        element_c, _, still_c, _, _, bulk_c = thermal.temperatures(self._k, heat)
+        return {
+            "true_temperature_c": bulk_c,
+            "sensor_c": self.probe.sheath_c,
+            "element_c": element_c,
+            "still_c": still_c,
+            "heater_w": self._heater_w,
+            "cooled_w": self._cooled_w,
+            "ice_kg": heat.bath_ice_kg + heat.ice_kg,
+            "water_kg": heat.water_kg,
+            "mains": self.stage.mains,
+            "stirred": float(self._stirred),
+            "energy_j": heat.electric_j,
+        }
+
     @property
     def ledger(self) -> Ledger:
         """The books of energy and mass since the start."""

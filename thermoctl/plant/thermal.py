@@ -161,13 +161,14 @@ def start(parameters: TankParameters) -> Heat:
 
 def temperatures(k: Conductances, heat: Heat) -> Temperatures:
     """Return the temperatures of the state."""
-    zone = heat.water_kg * WATER_J_PER_KG_K
-    element_c = heat.element_j / k.element_j_per_k
-    water_c = heat.water_j / (zone * k.stirred_share)
-    still_c = heat.still_j / (zone * k.still_share)
-    wall_c = heat.wall_j / k.wall_j_per_k
-    bath_c = heat.bath_j / (heat.bath_kg * WATER_J_PER_KG_K) if heat.bath_kg > 0.0 else math.nan
-    bulk_c = (heat.water_j + heat.still_j) / zone
+    element_j, water_j, still_j, wall_j, bath_j, water_kg, _, bath_kg, _ = heat[:_STORED]
+    zone = water_kg * WATER_J_PER_KG_K
+    element_c = element_j / k.element_j_per_k
+    water_c = water_j / (zone * k.stirred_share)
+    still_c = still_j / (zone * k.still_share)
+    wall_c = wall_j / k.wall_j_per_k
+    bath_c = bath_j / (bath_kg * WATER_J_PER_KG_K) if bath_kg > 0.0 else math.nan
+    bulk_c = (water_j + still_j) / zone
     return Temperatures(element_c, water_c, still_c, wall_c, bath_c, bulk_c)
 
 
