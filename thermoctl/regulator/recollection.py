@@ -11,7 +11,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
 
-from thermoctl.ports import Remembered, Remembering
+from thermoctl.ports import Remembered
 from thermoctl.regulator.guard import Failure, attempt
 from thermoctl.regulator.heater import memory as heater_memory
 from thermoctl.regulator.heater.response import Gain
@@ -58,26 +58,27 @@ def origin(mind: Mind) -> str | None:
     return told if isinstance(told, str) else None
 
 
-def remembering(minds: Iterable[Mind | None], watches: Named) -> Callable[[], Models]:
-    """Return a function that says what `minds` and `watches` would like kept now."""
-    held = [
-        (mind.name, mind.remembers, mind.belief)
-        for mind in minds
-        if mind is not None and mind.remembers is not None
-    ]
-    return partial(_remembered, held, [(name, each.known) for name, each in watches.items()])
+def remembering(charge: Mind, beside: Mind | None, watches: Named) -> Callable[[], Models]:
+    """Return a function that says what minds and `watches` would like kept now."""
+    beliefs = charge.belief, None if beside is None else beside.belief
+    heaters = {}
+    for name, each in watches.items():
+        heaters[name] = each.known
+    return partial(_remembered, (charge, beside), beliefs, heaters)
 
 
 def _remembered(
-    held: Iterable[tuple[str, Remembering, Any]], heaters: Iterable[tuple[str, Gain | None]]
+    minds: Iterable[Mind | None], beliefs: Iterable[Any], heaters: Mapping[str, Gain | None]
 ) -> Models:
     """Return what each law makes of its belief, nothing of one that fails; and the heaters."""
     models: dict[str, Mapping[str, Any]] = {}
-    for name, law, belief in held:
-        told = attempt(law.remember, belief)
+    for mind, belief in zip(minds, beliefs, strict=True):
+        if mind is None or mind.remembers is None:
+            continue
+        told = attempt(mind.remembers.remember, belief)
         if told is not None and not isinstance(told, Failure):
-            models[name] = told
-    for name, heater in heaters:
+            models[mind.name] = told
+    for name, heater in heaters.items():
         if heater is not None:
             models[name] = heater_memory.remember(heater)
     return models

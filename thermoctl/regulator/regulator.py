@@ -364,6 +364,7 @@ class Regulator:
         if self._events:
             events = tuple(Event(situation.t_s, name, fields) for name, fields in self._events)
             self._events.clear()
+        charge, beside = self._steering.mind, self._shadow.mind
         return Step(  # in the order of its fields: by their names it would take twice as long
             situation.t_s,
             measurement,
@@ -371,20 +372,20 @@ class Regulator:
             self._supervisor.state,
             self._wishes.setpoint_c,
             self._command,
-            self._steering.name,
+            charge.name,
             self._learning.estimate,
             beliefs,
             self._supervisor.alarms.rows(),
             events,
-            self._shadow.name,
+            None if beside is None else beside.name,
             self._shadow.power,
             self._shadow.score,
             self._feasibility.known,
             situation.setpoint_c,  # reference_c
             load,
-            self._steering.tell(self._shadow.mind),
-            origin(self._steering.mind),
-            remembering((self._steering.mind, self._shadow.mind), self._watches),
+            self._steering.tell(beside),
+            origin(charge),
+            remembering(charge, beside, self._watches),
         )
 
     def _emit(self, name: str, **fields: object) -> None:

@@ -26,32 +26,29 @@ class Shadow:
         Least and most power that is ever given.
     emit : callable
         Called as ``emit(name, **fields)`` when the law has failed.
+
+    Attributes
+    ----------
+    mind : Mind or None
+        The controller with what it remembers, None without one.
+    power : float or None
+        What it would give, within the limit of power; None while it has no answer.
     """
 
     def __init__(
         self, controller: Controller | None, power_min: float, power_max: float, emit: Emit
     ) -> None:
-        self._mind = None if controller is None else Mind(controller)
-        self._bounds = power_min, power_max
+        self.mind = None if controller is None else Mind(controller)
+        self._least, self._most = power_min, power_max
         self._emit = emit
-        self._power: float | None = None
-        self._surprises_k = (math.nan, math.nan)
+        self.power: float | None = None
+        self._surprise_k = self._shadow_surprise_k = math.nan
         self._tally = Tally()
-
-    @property
-    def mind(self) -> Mind | None:
-        """The controller with what it remembers, None without one."""
-        return self._mind
 
     @property
     def name(self) -> str | None:
         """The name of the controller in shadow, None without one."""
-        return None if self._mind is None else self._mind.name
-
-    @property
-    def power(self) -> float | None:
-        """What it would give, within the limit of power; None while it has no answer."""
-        return self._power
+        return None if self.mind is None else self.mind.name
 
     @property
     def score(self) -> ShadowScore | None:
@@ -60,24 +57,24 @@ class Shadow:
 
     def exchanged(self, charge: Mind) -> Mind:
         """Put `charge` into the shadow and return who stood there; the score begins anew."""
-        assert self._mind is not None
-        mind, self._mind = self._mind, charge
-        self._power, self._tally = None, Tally()
+        assert self.mind is not None
+        mind, self.mind = self.mind, charge
+        self.power, self._tally = None, Tally()
         return mind
 
     def replace(self, controller: Controller | None) -> None:
         """Put another law into the shadow, with nothing learnt yet; None: nobody."""
-        self._mind = None if controller is None else Mind(controller)
-        self._power, self._tally = None, Tally()
+        self.mind = None if controller is None else Mind(controller)
+        self.power, self._tally = None, Tally()
 
     def observe(self, situation: Situation, charge: Mind) -> None:
         """Show it the sample, after `charge` has seen it; note how surprised both were."""
-        mind = self._mind
+        mind = self.mind
         if mind is None:
             return
         of_shadow = attempt(_surprised_k, mind, situation)
         of_charge = attempt(charge.surprise_k, situation)  # a score costs no heat
-        self._surprises_k = (_number(of_charge), _number(of_shadow))
+        self._surprise_k, self._shadow_surprise_k = _number(of_charge), _number(of_shadow)
         if isinstance(of_shadow, Failure):
             self._drop(of_shadow)
 
@@ -95,7 +92,7 @@ class Shadow:
         steered : bool
             Whether the one in charge decided that power.
         """
-        mind, self._power = self._mind, None
+        mind, self.power = self.mind, None
         if mind is None:
             return
         if math.isfinite(situation.temperature_c):
@@ -104,15 +101,15 @@ class Shadow:
                 self._drop(asked)
                 return
             if is_finite_number(asked):
-                self._power = clamp(float(asked), *self._bounds)  # type: ignore[arg-type]
-        if steered and self._power is not None:
-            self._tally.add(seen_s, given, self._power, *self._surprises_k)
+                self.power = clamp(float(asked), self._least, self._most)  # type: ignore[arg-type]
+        if steered and self.power is not None:
+            self._tally.add(seen_s, given, self.power, self._surprise_k, self._shadow_surprise_k)
         else:
             self._tally.pause()
 
     def _drop(self, failure: Failure) -> None:
         self._emit("shadow.failed", controller=self.name, text=failure.text, trace=failure.trace)
-        self._mind, self._power, self._tally = None, None, Tally()
+        self.mind, self.power, self._tally = None, None, Tally()
 
 
 def _surprised_k(mind: Mind, situation: Situation) -> float:

@@ -90,7 +90,7 @@ def see(subject, t_s, temperature_c=37.4):
 
 def beliefs_of(subject):
     """Return what both controllers were shown."""
-    return subject._steering.mind.belief, subject._shadow._mind.belief
+    return subject._steering.mind.belief, subject._shadow.mind.belief
 
 
 def test_the_shadow_is_asked_at_every_sample_and_never_obeyed():
