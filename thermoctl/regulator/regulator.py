@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from thermoctl.errors import Refused
 from thermoctl.ports import Controller, Remembered, Situation
 from thermoctl.quantities import clamp, is_finite_number
-from thermoctl.regulator.feasible import Wanted
-from thermoctl.regulator.feasible_sides import balance_for
+from thermoctl.regulator.balance.feasible import Wanted
+from thermoctl.regulator.balance.sides import balance_for
 from thermoctl.regulator.guard import Failure, Guard, attempt
 from thermoctl.regulator.heater.sides import Watch, named, watch_for
 from thermoctl.regulator.judge import Verdict

@@ -6,7 +6,7 @@ import pytest
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
 from thermoctl.regulator.alarms import AlarmRegister
-from thermoctl.regulator.feasible import DRIVEN, Feasibility, Wanted
+from thermoctl.regulator.balance.feasible import DRIVEN, Feasibility, Wanted
 from thermoctl.signals import Measurement, Mode
 
 

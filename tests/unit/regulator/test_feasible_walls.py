@@ -7,10 +7,10 @@ import pytest
 
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
-from thermoctl.control.heat_belief import Known
 from thermoctl.regulator.alarms import AlarmRegister
-from thermoctl.regulator.feasible import Feasibility, Wanted
-from thermoctl.regulator.foretold import Settling, Slip
+from thermoctl.regulator.balance.feasible import Feasibility, Wanted
+from thermoctl.regulator.balance.foretold import Settling, Slip
+from thermoctl.regulator.balance.heat_belief import Known
 from thermoctl.regulator.guard import Failure
 from thermoctl.signals import Feasible, Measurement, Mode
 
@@ -129,7 +129,7 @@ def test_a_balance_that_raises_costs_the_loop_neither_its_step_nor_its_heat(monk
 
     loop = {"mode": "auto", "setpoint_c": 40.0, "trip_above_c": 95.0}
     regulator = regulator_for(load({"loops": {"tank": loop}}))
-    monkeypatch.setattr("thermoctl.control.heat_loss.after", failing)
+    monkeypatch.setattr("thermoctl.regulator.balance.heat_loss.after", failing)
     steps = [regulator.step(Measurement(float(t_s), 22.0 + 0.01 * t_s)) for t_s in range(60)]
     assert [event.name for step in steps for event in step.events if "fail" in event.name] == [
         "balance.failed"

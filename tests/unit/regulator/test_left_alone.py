@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from thermoctl.regulator.left_alone import LEFT_K, WAITS_S, Beyond, LeftAlone
+from thermoctl.regulator.balance.left_alone import LEFT_K, WAITS_S, Beyond, LeftAlone
 
 STRETCH_S, GAIN, LOSS = 10.0, 0.04, 0.008
 

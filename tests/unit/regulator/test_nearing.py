@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from thermoctl.control.heat_belief import Known
-from thermoctl.regulator.foretold import Nearing
+from thermoctl.regulator.balance.foretold import Nearing
+from thermoctl.regulator.balance.heat_belief import Known
 
 COOLS = -1.0
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from thermoctl.control.heat_belief import Known
+from thermoctl.regulator.balance.heat_belief import Known
 
 SLIPS_S, SETTLES_S, NEARS_S = 600.0, 600.0, 1800.0
 """Memory of how late an arrival was, of the power that was told to hold, and of what was told to be

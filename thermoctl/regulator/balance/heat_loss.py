@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from thermoctl.control.heat_belief import (
+from thermoctl.regulator.balance.heat_belief import (
     BETA,
     WARMS_AT_MOST_K,
     D,

@@ -11,14 +11,14 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from thermoctl.control import heat_loss
-from thermoctl.control.heat_belief import HeatBelief, Known, T
-from thermoctl.control.heat_loss import Stretch
 from thermoctl.quantities import clamp
 from thermoctl.regulator.alarms import AlarmRegister
-from thermoctl.regulator.foretold import Nearing, Settling, Slip
+from thermoctl.regulator.balance import heat_loss
+from thermoctl.regulator.balance.foretold import Nearing, Settling, Slip
+from thermoctl.regulator.balance.heat_belief import HeatBelief, Known, T
+from thermoctl.regulator.balance.heat_loss import Stretch
+from thermoctl.regulator.balance.left_alone import PATIENCE_S, Beyond, LeftAlone
 from thermoctl.regulator.guard import Failure
-from thermoctl.regulator.left_alone import PATIENCE_S, Beyond, LeftAlone
 from thermoctl.regulator.supervisor import Emit
 from thermoctl.signals import Alarm, Feasible, Mode
 

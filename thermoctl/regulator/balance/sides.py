@@ -16,7 +16,7 @@ import math
 from dataclasses import replace
 
 from thermoctl.regulator.alarms import AlarmRegister
-from thermoctl.regulator.feasible import NONE, Feasibility, Wanted
+from thermoctl.regulator.balance.feasible import NONE, Feasibility, Wanted
 from thermoctl.regulator.guard import Failure
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Emit

@@ -17,8 +17,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from thermoctl.control.heat_belief import WARMS_AT_MOST_K
 from thermoctl.quantities import clamp
+from thermoctl.regulator.balance.heat_belief import WARMS_AT_MOST_K
 from thermoctl.regulator.heater.known import OFF_LAGS
 from thermoctl.regulator.heater.response import LAGS_S
 

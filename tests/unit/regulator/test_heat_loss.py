@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from thermoctl.control import heat_loss
-from thermoctl.control.heat_belief import Known
-from thermoctl.control.heat_loss import Stretch
+from thermoctl.regulator.balance import heat_loss
+from thermoctl.regulator.balance.heat_belief import Known
+from thermoctl.regulator.balance.heat_loss import Stretch
 
 SPAN_S = 10.0
 REST_C, SLOPE, GAIN = 15.0, 2e-4, 0.02
