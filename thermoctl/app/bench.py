@@ -25,10 +25,10 @@ from thermoctl import __version__
 from thermoctl.app.compose import loop_for
 from thermoctl.app.cycle_record import as_line
 from thermoctl.app.daemon.insight_watch import InsightService, insights_for
+from thermoctl.app.doubts import doubts
 from thermoctl.app.live import Action, Desk, Facts, Keys, LiveModel, LiveScreen, look_for
 from thermoctl.app.live.desk import DISTURBANCES
 from thermoctl.app.live.look import printable
-from thermoctl.app.readings import coarse_readings
 from thermoctl.app.report import Summary, closing_lines
 from thermoctl.app.settings import Settings
 from thermoctl.errors import Refused
@@ -73,10 +73,10 @@ def run_bench(settings: Settings, options: BenchOptions) -> None:
 
         loop = loop_for(settings, clock, publish, beside=False)
         stack.callback(loop.shut_down)
-        for name, text in coarse_readings(settings).items():
-            loop.report("config.coarse", loop=name, text=text)
+        for doubt in doubts(settings):
+            loop.report(doubt.event, loop=doubt.loop, key=doubt.key, text=doubt.text)
             if options.as_json:  # which has no events
-                click.echo(f"thermoctl: loops.{name}.sensor: {text}", err=True)
+                click.echo(f"thermoctl: {doubt}", err=True)
         _end_on_signals(loop, clock)
         if options.history is not None:
             sinks.append(stack.enter_context(_recorded(settings, options.history)))

@@ -25,8 +25,8 @@ from thermoctl.app.commands.config import runnable
 from thermoctl.app.compose import board_builder, driver_of
 from thermoctl.app.configuration.document import exposures
 from thermoctl.app.daemon.daemon import state_for
+from thermoctl.app.doubts import doubts
 from thermoctl.app.parts import sensor_for
-from thermoctl.app.readings import coarse_readings
 from thermoctl.app.settings import ETC, Settings
 from thermoctl.errors import ConfigError, DriverError, NotPermitted
 from thermoctl.ports import Board, Clock
@@ -97,10 +97,7 @@ def _configuration(files: list[Path]) -> tuple[Settings | None, list[Finding]]:
         wrong = str(error).splitlines()
         return None, [*warnings, *(Finding(FAIL, "configuration", line) for line in wrong)]
     names = ", ".join(map(str, files))
-    warnings += [
-        Finding(WARN, "configuration", f"loops.{name}.sensor: {text}")
-        for name, text in coarse_readings(settings).items()
-    ]
+    warnings += [Finding(WARN, "configuration", str(doubt)) for doubt in doubts(settings)]
     return settings, [Finding(OK, "configuration", names), *warnings]
 
 

@@ -49,6 +49,7 @@ _BY_LEVEL: Final = {
         "board.silent",
         "clock.stepped",
         "config.coarse",
+        "config.narrow",
         "controller.gain_doubtful",
         "controller.refused",
         "controller.tuning_failed",

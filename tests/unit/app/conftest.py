@@ -106,7 +106,7 @@ volume_l = 8.0
 [loops.tank]
 setpoint_c = 37.5
 trip_above_c = 60.0
-
+setpoint_max_c = 55.0
 [loops.tank.sensor]
 board = "daq"
 

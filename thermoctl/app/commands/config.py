@@ -14,7 +14,7 @@ from thermoctl.app.configuration.in_force import in_force
 from thermoctl.app.configuration.new import new
 from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.configuration.toml_text import toml_text
-from thermoctl.app.readings import coarse_readings
+from thermoctl.app.doubts import doubts
 from thermoctl.app.settings import Settings, default_files, load_all, settings_in
 
 
@@ -33,8 +33,7 @@ def check(configs: tuple[Path, ...], as_json: bool) -> None:
     """Say whether a configuration can run, or everything that is wrong with it."""
     files = list(configs) or default_files()
     settings = runnable(files)
-    coarse = coarse_readings(settings).items()
-    warnings = [*exposures(files), *(f"loops.{name}.sensor: {text}" for name, text in coarse)]
+    warnings = [*exposures(files), *map(str, doubts(settings))]
     for warning in warnings:
         click.echo(f"thermoctl: {warning}", err=True)
     boards = {name: str(getattr(each, "kind", "")) for name, each in settings.boards.items()}

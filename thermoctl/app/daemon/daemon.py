@@ -22,8 +22,8 @@ from thermoctl.app.compose import loop_for
 from thermoctl.app.daemon.clerk import Clerk
 from thermoctl.app.daemon.insight_watch import InsightService, insights_for
 from thermoctl.app.daemon.resuming import Resumption, kept_latches
+from thermoctl.app.doubts import doubts
 from thermoctl.app.parts import law_of_kind
-from thermoctl.app.readings import coarse_readings
 from thermoctl.app.settings import Settings, default_files, load_all
 from thermoctl.errors import ConfigError
 from thermoctl.runtime.clock import MonotonicClock
@@ -168,8 +168,8 @@ class Daemon:
             self._clients.start()
             stack.callback(self._clients.close)
             self._emit("loop.started", None, loops=list(self._settings.loops), version=__version__)
-            for name, text in coarse_readings(self._settings).items():
-                self._emit("config.coarse", name, text=text)
+            for doubt in doubts(self._settings):
+                self._emit(doubt.event, doubt.loop, key=doubt.key, text=doubt.text)
             gc.freeze()  # what is loaded now stays: no collection needs to look at it again
             control = threading.Thread(target=self._control, name="control", daemon=True)
             control.start()

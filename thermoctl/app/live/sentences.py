@@ -43,6 +43,7 @@ _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
     "change.detected": (Mark.CHANGE, ("{text}", "The water has jumped")),
     "clock.stepped": (Mark.NONE, ("Wall clock stepped by {step_s}", "Wall clock stepped")),
     "config.coarse": (Mark.WARNING, ("Coarse readings: {text}", "Readings are coarse")),
+    "config.narrow": (Mark.WARNING, ("Near a trip: {text}", "Set point near a trip")),
     "config.loaded": (Mark.NONE, ("Settings loaded: {path}", "Settings loaded")),
     "control.recovered": (
         Mark.NONE,
