@@ -2,31 +2,52 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import click
 
 from thermoctl.app import plugins
 from thermoctl.app.commands.options import FILE, examples
 from thermoctl.app.compose import wiring_errors
-from thermoctl.app.configuration.document import BadConfiguration, Document
+from thermoctl.app.configuration.document import BadConfiguration, Document, Problem
 from thermoctl.app.configuration.tables import SensorTable
 from thermoctl.app.configuration.toml_text import toml_value
+from thermoctl.app.doubts import HEADROOM_K, Doubt, doubts
 from thermoctl.app.parts import reach_c, sensor_for
 from thermoctl.app.settings import settings_in
 from thermoctl.control.adaptive import Adaptive
 from thermoctl.errors import ConfigError, Refused
 
 _WATER_J_PER_L_K = 4186.0
-_HEADROOM_K, _LEAST_HEADROOM_K = 20.0, 2.0
+_HEADROOM_K, _LEAST_HEADROOM_K = 20.0, 2.0  # of a trip above a set point
 _NEAR_BOILING_C, _BOILING_C = 95.0, 100.0
 _CURVES = list(SensorTable.model_json_schema()["properties"]["curve"]["enum"])
 _RESISTIVE = ("pt100", "pt1000", "ntc")
-_POSITIVE = click.FloatRange(min=0.0, min_open=True)
-_WATER = click.FloatRange(max=_BOILING_C, max_open=True)
+_NO_HARDWARE: Final = ("null", "simulated")
+"""Boards behind which nothing can be heated by mistake."""
+_NEVER_GUESSED: Final = ("port", "volume_l", "heater_w")
+"""What only somebody who has seen a real board can know."""
+
+
+class _Finite(click.FloatRange):
+    """A number in a range; unlike its base it refuses NaN and infinity, which no range refuses."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return `value` as a number in the range."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"expected a finite number, got {value}", param, ctx)
+        return float(number)
+
+
+_NUMBER, _POSITIVE = _Finite(), _Finite(min=0.0, min_open=True)
+_WATER = _Finite(max=_BOILING_C, max_open=True)
 _TAKEN = "expected a file that is not there yet, got {}; --force replaces it"
 
 
@@ -43,6 +64,7 @@ class Answers:
     setpoint_c: float
     trip_above_c: float
     mode: str
+    resume: bool
     accept_no_dead_man: bool
 
     @property
@@ -52,35 +74,45 @@ class Answers:
 
     @property
     def setpoint_max_c(self) -> float:
-        """Highest set point: from the trip a tenth of the way back to the set point."""
-        return round(self.trip_above_c - 0.1 * (self.trip_above_c - self.setpoint_c), 2)
+        """Highest set point: a tenth of the way back from the trip, but with headroom."""
+        room_k = max(0.1 * (self.trip_above_c - self.setpoint_c), HEADROOM_K)
+        return max(round(self.trip_above_c - room_k, 2), self.setpoint_c)
 
 
 @click.command(
     epilog=examples(
         "thermoctl config new -o tank.toml",
-        "thermoctl config new --yes --kind thermodaq --setpoint-c 40 --trip-above-c 55",
+        "thermoctl config new --yes --setpoint-c 40 --trip-above-c 55",
+        "thermoctl config new --yes --kind thermodaq --port /dev/thermodaq --volume-l 8 "
+        "--heater-w 1500",
     )
 )
 @click.option("-o", "--out", type=FILE, help="File; stdout if not given.")
 @click.option("--force", is_flag=True, help="Replace a file that is there.")
-@click.option("--yes", is_flag=True, help="Ask nothing: take the default where none is given.")
+@click.option(
+    "--yes",
+    is_flag=True,
+    help="Ask nothing: take the default where none is given; a real board needs --port, "
+    "--volume-l and --heater-w.",
+)
 @click.option("--kind", help="Kind of the board; `thermoctl drivers` lists them.")
 @click.option("--port", help="Serial device of the board.")
 @click.option("--sensor", type=click.Choice(_CURVES), help="What measures.")
 @click.option("--pull-up-ohm", type=_POSITIVE, help="Resistor a pt100, pt1000 or ntc is read with.")
 @click.option("--volume-l", type=_POSITIVE, help="Water in the tank, in litres.")
 @click.option("--heater-w", type=_POSITIVE, help="Rated power of the heater, in W.")
-@click.option("--setpoint-c", type=float, help="Temperature to hold, in degC.")
-@click.option("--trip-above-c", type=float, help="Heater off for good above this, in degC.")
+@click.option("--setpoint-c", type=_NUMBER, help="Temperature to hold, in degC.")
+@click.option("--trip-above-c", type=_NUMBER, help="Heater off for good above this, in degC.")
 @click.option("--mode", type=click.Choice(["off", "auto"]), help="Mode at the first start.")
+@click.option("--resume/--no-resume", default=None, help="Whether a restart goes on.")
 @click.option("--accept-no-dead-man", is_flag=True, help="An independent thermostat is fitted.")
 def new(out: Path | None, force: bool, yes: bool, **given: Any) -> None:
     """Ask a few questions and write a commented configuration."""
     if out is not None and out.exists() and not force:
         raise Refused(_TAKEN.format(out))
     text = commented(_answers(_Interview(given, yes)))
-    _check(text)
+    for warning in _checked(text):
+        click.echo(f"thermoctl: {warning}", err=True)
     if out is None:
         click.echo(text, nl=False)
         return
@@ -101,7 +133,29 @@ class _Interview:
             return value
         if self._yes:
             return default
-        return click.prompt(question, default=default, type=kind, err=True)
+        try:
+            if kind is bool:
+                return click.confirm(question, default=default, err=True)
+            return click.prompt(question, default=default, type=kind, err=True)
+        except click.Abort as abort:
+            if not isinstance(abort.__context__, EOFError):
+                raise
+            click.echo(err=True)  # the question stands on this line
+            text = "expected an answer, got the end of input; with --yes nothing is asked"
+            raise click.UsageError(text, click.get_current_context(silent=True)) from abort
+
+    def refuse_to_guess(self, kind: str) -> None:
+        """Raise `click.UsageError` where a real board would be described by nobody."""
+        known = ("volume_l", "heater_w", *plugins.find(plugins.DRIVERS, kind).Settings.model_fields)
+        missing = [each for each in _NEVER_GUESSED if each in known and self._given[each] is None]
+        if self._yes and missing:
+            wanted = ", ".join(map(_option, missing))
+            text = f"expected {wanted} for {kind!r}, a real board, got --yes, which does not guess"
+            raise click.UsageError(text, click.get_current_context(silent=True))
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def _answers(interview: _Interview) -> Answers:
@@ -109,24 +163,28 @@ def _answers(interview: _Interview) -> Answers:
     kinds = list(plugins.kinds(plugins.DRIVERS))
     first = "simulated" if "simulated" in kinds else kinds[0]
     kind = ask("kind", "Board", first, click.Choice(kinds))
-    driver = plugins.find(plugins.DRIVERS, kind)
-    port = None
-    if "port" in driver.Settings.model_fields:
+    port, real = None, kind not in _NO_HARDWARE
+    if real:
+        interview.refuse_to_guess(kind)
+    if "port" in plugins.find(plugins.DRIVERS, kind).Settings.model_fields:
         port = ask("port", "Serial device", f"/dev/{kind}", str)
     sensor = ask("sensor", "Sensor", "lm335", click.Choice(_CURVES))
     pull_up_ohm = None
     if sensor in _RESISTIVE:
         usual_ohm = 1_000.0 if sensor == "pt100" else 10_000.0
         pull_up_ohm = ask("pull_up_ohm", "Resistor it is read with, in ohm", usual_ohm, _POSITIVE)
-    volume_l = ask("volume_l", "Water in the tank, in litres", 8.0, _POSITIVE)
-    heater_w = ask("heater_w", "Rated power of the heater, in W", 1500.0, _POSITIVE)
+    usual = (None, None) if real else (8.0, 1500.0)
+    volume_l = ask("volume_l", "Water in the tank, in litres", usual[0], _POSITIVE)
+    heater_w = ask("heater_w", "Rated power of the heater, in W", usual[1], _POSITIVE)
     setpoint_c = ask("setpoint_c", "Temperature to hold, in degC", 37.5, _WATER)
     trip_c = ask("trip_above_c", "Heater off for good above, in degC", *_trip(setpoint_c))
     if not trip_c > setpoint_c:
         raise ConfigError(
             f"expected --trip-above-c above the set point of {setpoint_c:g} degC, got {trip_c:g}"
         )
-    mode = ask("mode", "Mode at the first start", "auto", click.Choice(["off", "auto"]))
+    first_mode = "off" if real else "auto"  # what heats is switched on by somebody who is there
+    mode = ask("mode", "Mode at the first start", first_mode, click.Choice(["off", "auto"]))
+    resume = ask("resume", "Go on after a restart", mode == "auto" and not real, bool)
     return Answers(
         kind=kind,
         port=port,
@@ -137,6 +195,7 @@ def _answers(interview: _Interview) -> Answers:
         setpoint_c=setpoint_c,
         trip_above_c=trip_c,
         mode=mode,
+        resume=resume,
         accept_no_dead_man=bool(interview.ask("accept_no_dead_man", "", False)),
     )
 
@@ -191,7 +250,7 @@ def _loop_lines(answers: Answers) -> list[str]:
         _line("setpoint_max_c", answers.setpoint_max_c, "no set point above this is accepted"),
         _line("period_s", 1.0, "one sample, one power, once a second"),
         _line("mode", answers.mode, "at the first start: off, manual or auto"),
-        _line("resume", answers.mode == "auto", "go on after a restart; else a restart is off"),
+        _line("resume", answers.resume, "go on after a restart; otherwise the loop starts off"),
         "",
         "[loops.tank.sensor]",
         _line("board", "daq"),
@@ -240,12 +299,25 @@ def _line(key: str, value: Any, comment: str = "") -> str:
     return f"{setting:<27} # {comment}" if comment else setting
 
 
-def _check(text: str) -> None:
+def _checked(text: str) -> list[Doubt]:
     """Load what is to be written; raise `BadConfiguration` when the answers do not go together."""
     document = Document(tomllib.loads(text), "answers")
-    wrong = [document.problem(*each) for each in wiring_errors(settings_in(document))]
+    try:
+        settings = settings_in(document)
+    except BadConfiguration as error:
+        raise BadConfiguration([_as_answer(each) for each in error.problems]) from error
+    wrong = [document.problem(*each) for each in wiring_errors(settings)]
     if wrong:
         raise BadConfiguration(wrong)
+    return doubts(settings)
+
+
+def _as_answer(problem: Problem) -> Problem:
+    """Return `problem` with the option it came from, in place of a key that nobody has written."""
+    last = problem.key[-1] if problem.key else ""
+    name = "sensor" if last == "curve" else last
+    asked = {each.name for each in new.params}
+    return replace(problem, key=(_option(name),)) if name in asked else problem
 
 
 def _write(out: Path, text: str, force: bool) -> None:

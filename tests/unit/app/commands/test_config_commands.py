@@ -149,6 +149,15 @@ def test_a_check_says_that_readings_are_coarse_and_what_to_set(run, file):
     assert "conversions to 32" in json.loads(out)["warnings"][0]
 
 
+def test_a_check_says_that_a_set_point_lies_next_to_the_trip(run, file):
+    file.write_text(file.read_text().replace("= 37.5", "= 59.99").replace("= 55.0", "= 60.0"))
+    code, out, err = run("config", "check", "-c", file)
+    assert (code, out.startswith(f"{file}: ok")) == (0, True)
+    assert "setpoint_c: expected 57, 3 K below trip_above_c, or farther, got 59.99" in err
+    _, out, _ = run("config", "check", "-c", file, "--json")
+    assert "setpoint_c: expected 57" in json.loads(out)["warnings"][0]
+
+
 # -- show and schema -------------------------------------------------------------------------------
 
 
@@ -239,10 +248,15 @@ def test_every_reference_in_the_schema_leads_somewhere(run):
 # -- new -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["simulated", "null", "thermodaq"])
-def test_a_new_configuration_of_any_kind_can_run(run, tmp_path, kind):
+KNOWN = ("--port", "/dev/ttyACM0", "--volume-l", 8, "--heater-w", 1500)
+
+
+@pytest.mark.parametrize(
+    ("kind", "known"), [("simulated", ()), ("null", ()), ("thermodaq", KNOWN)], ids=str
+)
+def test_a_new_configuration_of_any_kind_can_run(run, tmp_path, kind, known):
     path = tmp_path / "new.toml"
-    code, out, err = run("config", "new", "--yes", "--kind", kind, "-o", path)
+    code, out, err = run("config", "new", "--yes", "--kind", kind, *known, "-o", path)
     assert (code, out) == (0, "")
     assert str(path) in err
     assert list(wiring_errors(load(path))) == []
@@ -255,7 +269,7 @@ def test_a_new_configuration_has_the_gain_of_the_heater_and_the_water(run):
 
 
 def test_the_answers_of_a_person_become_the_configuration():
-    answers = "thermodaq\n/dev/ttyACM3\nntc\n4700\n12\n1000\n65\n80\noff\n"
+    answers = "thermodaq\n/dev/ttyACM3\nntc\n4700\n12\n1000\n65\n80\noff\nn\n"
     result = CliRunner().invoke(cli, ["config", "new"], input=answers)
     assert result.exit_code == 0, result.stderr
     settings = load(tomllib.loads(result.stdout))
@@ -267,14 +281,14 @@ def test_the_answers_of_a_person_become_the_configuration():
 
 
 def test_a_trip_below_the_setpoint_is_asked_again():
-    answers = "simulated\nlm335\n8\n1500\n60\n50\n70\nauto\n"
+    answers = "simulated\nlm335\n8\n1500\n60\n50\n70\nauto\ny\n"
     result = CliRunner().invoke(cli, ["config", "new"], input=answers)
     assert result.exit_code == 0, result.stderr
     assert load(tomllib.loads(result.stdout)).loops["tank"].trip_above_c == 70.0
 
 
 def test_water_is_neither_held_nor_tripped_above_100_degrees():
-    answers = "simulated\nlm335\n8\n1500\n120\n60\n1500\n100\nauto\n"
+    answers = "simulated\nlm335\n8\n1500\n120\n60\n1500\n100\nauto\ny\n"
     result = CliRunner().invoke(cli, ["config", "new"], input=answers)
     assert result.exit_code == 0, result.stderr
     loop = load(tomllib.loads(result.stdout)).loops["tank"]
@@ -309,6 +323,79 @@ def test_options_that_contradict_each_other_write_nothing(run, tmp_path):
     assert not path.exists()
 
 
+def test_a_real_board_starts_off_and_does_not_go_on_after_a_restart(run):
+    code, out, _ = run("config", "new", "--yes", "--kind", "thermodaq", *KNOWN)
+    loop = load(tomllib.loads(out)).loops["tank"]
+    assert (code, loop.mode, loop.resume) == (0, "off", False)
+
+
+def test_a_real_board_goes_on_by_itself_where_that_was_asked_for(run):
+    asked = ("--mode", "auto", "--resume")
+    code, out, _ = run("config", "new", "--yes", "--kind", "thermodaq", *KNOWN, *asked)
+    loop = load(tomllib.loads(out)).loops["tank"]
+    assert (code, loop.mode, loop.resume) == (0, "auto", True)
+
+
+def test_a_person_who_agrees_to_everything_has_a_real_board_start_off():
+    answers = "thermodaq\n\n\n12\n1000\n\n\n\n\n"
+    result = CliRunner().invoke(cli, ["config", "new"], input=answers)
+    assert result.exit_code == 0, result.stderr
+    loop = load(tomllib.loads(result.stdout)).loops["tank"]
+    assert (loop.mode, loop.resume) == ("off", False)
+    assert "Go on after a restart [y/N]" in result.stderr
+
+
+@pytest.mark.parametrize("left_out", [0, 2, 4])
+def test_what_only_a_person_can_know_of_a_real_board_is_not_guessed(run, left_out):
+    known = KNOWN[:left_out] + KNOWN[left_out + 2 :]
+    code, out, err = run("config", "new", "--yes", "--kind", "thermodaq", *known)
+    assert (code, out) == (2, "")
+    assert f"expected {KNOWN[left_out]} for 'thermodaq', a real board" in err
+
+
+def test_all_that_is_not_guessed_is_named_at_once(run):
+    code, _, err = run("config", "new", "--yes", "--kind", "thermodaq")
+    assert code == 2
+    assert "expected --port, --volume-l, --heater-w for 'thermodaq'" in err
+
+
+@pytest.mark.parametrize("option", ["--setpoint-c", "--trip-above-c", "--heater-w"])
+def test_an_answer_that_is_no_number_is_told_by_the_option_it_was_given_to(run, option):
+    code, _, err = run("config", "new", "--yes", option, "nan")
+    assert code == 2
+    assert err.startswith(f"thermoctl: {option}: expected a finite number, got nan")
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--heater-w", "1e9"), ("--volume-l", "1e9"), ("--setpoint-c", "-280")]
+)
+def test_an_answer_beyond_what_can_be_is_told_by_its_option(run, option, value):
+    code, _, err = run("config", "new", "--yes", option, value)
+    assert code == 78
+    assert f"answers: {option}: expected at " in err
+
+
+def test_the_end_of_input_is_a_wrong_use_on_a_line_of_its_own():
+    result = CliRunner().invoke(cli, ["config", "new"], input="simulated\n")
+    assert result.exit_code == 2
+    *_, question, error = [line for line in result.stderr.splitlines() if "see" not in line][-3:]
+    assert "expected an answer" not in question
+    assert "expected an answer, got the end of input; with --yes nothing is asked" in error
+
+
+def test_a_set_point_that_was_answered_next_to_the_trip_is_told(run):
+    _, out, err = run("config", "new", "--yes", "--setpoint-c", 50, "--trip-above-c", 50.5)
+    assert "loops.tank.setpoint_c: expected 49.5, 1 K below trip_above_c, or farther, got 50" in err
+    assert load(tomllib.loads(out)).loops["tank"].setpoint_c == 50.0
+
+
+@pytest.mark.parametrize("trip_c", [52, 55, 60, 70])
+def test_the_highest_set_point_that_is_written_has_room_for_an_overshoot(run, trip_c):
+    _, out, err = run("config", "new", "--yes", "--setpoint-c", 50, "--trip-above-c", trip_c)
+    assert err == ""
+    assert load(tomllib.loads(out)).loops["tank"].setpoint_max_c <= trip_c - 1.0
+
+
 @contextmanager
 def short_files():
     """Let no file grow beyond a hundred bytes, as on a disk that is full.
@@ -338,10 +425,11 @@ def test_the_watts_that_were_answered_are_the_loop_s_too(run, tmp_path):
 
 
 def test_a_board_without_a_dead_man_needs_the_promise_of_a_thermostat(run, foreign):
-    code, _, err = run("config", "new", "--yes", "--kind", "foreign")
+    arguments = ("config", "new", "--yes", "--kind", "foreign", *KNOWN[2:])
+    code, _, err = run(*arguments)
     assert code == 78
     assert "accept_no_dead_man" in err
-    code, out, _ = run("config", "new", "--yes", "--kind", "foreign", "--accept-no-dead-man")
+    code, out, _ = run(*arguments, "--accept-no-dead-man")
     assert code == 0
     assert tomllib.loads(out)["service"] == {"accept_no_dead_man": True}
 
