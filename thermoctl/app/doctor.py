@@ -94,7 +94,7 @@ def _configuration(files: list[Path]) -> tuple[Settings | None, list[Finding]]:
     try:
         settings = runnable(files)
     except ConfigError as error:
-        wrong = str(error).splitlines()
+        wrong = [str(each) for each in getattr(error, "problems", ())] or str(error).splitlines()
         return None, [*warnings, *(Finding(FAIL, "configuration", line) for line in wrong)]
     names = ", ".join(map(str, files))
     warnings += [Finding(WARN, "configuration", str(doubt)) for doubt in doubts(settings)]

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel
 
 from thermoctl.app import plugins
+from thermoctl.app.configuration.repair import repaired, without
 from thermoctl.app.configuration.tables import (
     ActuatorTable,
     EstimatorTable,
@@ -33,7 +34,7 @@ from thermoctl.regulator.heater.check import HeaterCheck, weakest_of
 
 HEAT, COOL, HEAT_COOL = "heat", "cool", "heat-cool"
 
-_ROOM_C = 25.0
+_ROOM_C, _ROOM_VOLTS = 25.0, ("lm335", "lm35", "tmp36")  # which are made to show that
 _HALVINGS = 50
 _ARX_EXCITATION_MIN = 0.1
 _ARX_GAIN_SHARE = 0.2
@@ -105,6 +106,28 @@ def check_parts(table: LoopTable) -> None:
         law_for(output)
 
 
+def part_errors(table: LoopTable, *, whole: bool = True) -> Iterator[BadOption]:
+    """Yield each option that keeps a loop's parts from being built.
+
+    What was refused is left out for the next attempt. What depends on several keys can then no
+    longer be judged; nor can it where the table is not `whole` from the start.
+    """
+    content: Mapping[str, Any] = table.model_dump(mode="json", exclude_unset=True)
+    while True:
+        try:
+            check_parts(table)
+            return
+        except BadOption as error:
+            path = error.path
+            if whole or (len(path) > 1 and path[-1] != "action"):
+                yield error
+        rest = without(content, path[:-1] if path[-1:] == ("kind",) else path) if path else content
+        left = repaired(LoopTable, rest, {})
+        if rest == content or left is None:
+            return
+        content, table, whole = rest, left, False
+
+
 def action_of(controller: Controller) -> str:
     """Return what power does to the plant; a law without a word of it heats."""
     return str(getattr(controller, "action", HEAT))
@@ -128,13 +151,16 @@ def _check_action(loop: LoopTable, name: str, law: Controller | None, charge: Co
         raise BadOption(f"expected {action_of(charge)!r} as in charge, got {action!r}", path)
 
 
-def _check_reach(table: LoopTable, sensor: curves.Sensor) -> None:
+def _check_reach(table: LoopTable, sensor: curves.Sensor, part: str = "sensor") -> None:
     """Refuse a trip or a set point that no reading could ever pass.
 
     Beyond its ends a sensor counts as broken, so a trip out there would never act.
     """
     coldest_c, hottest_c = reach_c(sensor)
     if not coldest_c < table.setpoint_c < hottest_c:
+        if getattr(table, part).curve in _ROOM_VOLTS and not coldest_c < _ROOM_C < hottest_c:
+            text = f"expected a converter that can show a room, got {sensor.reference_v:g} V"
+            raise BadOption(text, (part, "reference_v"))
         text = f"expected what the sensor can show, {coldest_c:.1f} to {hottest_c:.1f} °C"
         raise BadOption(f"{text}, got {table.setpoint_c:g}", ("setpoint_c",))
     if not table.trip_above_c < hottest_c:
@@ -153,7 +179,7 @@ def _check_second(table: LoopTable, second: SensorTable) -> None:
     if (second.board, second.input) == (first.board, first.input):
         text = f"expected another input than the first sensor's, got {second.input!r}"
         raise BadOption(f"{text} of {second.board!r} twice", (*path, "input"))
-    _check_reach(table, sensor_for(second, "second_sensor"))
+    _check_reach(table, sensor_for(second, *path), *path)
 
 
 def reach_c(sensor: curves.Sensor) -> tuple[float, float]:

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, get_origin, get_type_hints
+from typing import Any, Final, get_origin, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -99,7 +99,7 @@ def build(law: type, options: Mapping[str, Any], **injected: Any) -> Any:
     accepted = {name: _accepted(law, known, name, value) for name, value in options.items()}
     for field in dataclasses.fields(law):
         if field.name in known and field.name not in accepted and _is_required(field):
-            raise BadOption("is missing", (field.name,))
+            raise BadOption("expected a value, got none", (field.name,))
     try:
         return law(**accepted, **injected)
     except (TypeError, ValueError) as error:
@@ -113,7 +113,25 @@ def blamed(error: Exception, known: Iterable[str]) -> BadOption:
     """
     text = str(error)
     first, _, rest = text.partition(" ")
-    return BadOption(rest, (first,)) if first in set(known) else BadOption(text)
+    return BadOption(_expected(rest), (first,)) if first in set(known) else BadOption(text)
+
+
+_MUST: Final = (
+    ("must lie in ", "a number in "),
+    ("must lie ", ""),
+    ("must be positive and finite", "a finite number above 0"),
+    ("must be positive", "a number above 0"),
+    ("must be finite", "a finite number"),
+    ("must be ", ""),
+)
+
+
+def _expected(text: str) -> str:
+    """Return what a law says of its argument in the words of a configuration."""
+    for said, told in _MUST:
+        if text.startswith(said):
+            return f"expected {told}{text.removeprefix(said)}"
+    return text
 
 
 def _within(name: str, group: Any, options: Any) -> Any:

@@ -22,6 +22,7 @@ from thermoctl.app.configuration.document import (
     Problem,
     read_document,
 )
+from thermoctl.app.configuration.repair import repaired, without_keys_beside
 from thermoctl.app.configuration.tables import HistoryTable, LoopTable, ServiceTable, Table
 from thermoctl.app.configuration.wording import (
     reasons,
@@ -30,10 +31,18 @@ from thermoctl.app.configuration.wording import (
     validated,
     without_unknown_keys,
 )
-from thermoctl.app.parts import check_parts
+from thermoctl.app.parts import part_errors
 from thermoctl.errors import ConfigError
 
 ETC = Path("/etc/thermoctl")
+_STAND_INS = {
+    "setpoint_c": 20.0,
+    "trip_above_c": 100.0,
+    "trip_below_c": None,
+    "setpoint_min_c": None,
+    "setpoint_max_c": None,
+}
+"""Limits that contradict nothing, for a loop whose own do: its laws are tried out all the same."""
 _LOOP_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")  # it names files and topics too
 
 
@@ -111,6 +120,7 @@ class _Reading:
     def __init__(self, document: Document) -> None:
         self._document = document
         self._problems: list[Problem] = []
+        self._astray = False  # a channel names a board that is not there
 
     def settings(self) -> Settings:
         content = self._document.content
@@ -121,8 +131,15 @@ class _Reading:
         for key, model in (("history", HistoryTable), ("service", ServiceTable)):
             tables[key] = self._table(model, content.get(key, {}), (key,))
         if self._problems:
-            raise BadConfiguration(self._problems)
+            raise BadConfiguration(self._problems, self._readable(tables))
         return Settings.model_validate({**tables, "loops": as_blocks(tables["loops"])})
+
+    def _readable(self, tables: Mapping[str, Any]) -> Settings | None:
+        """Return what was read, where loops and boards are whole, though not right."""
+        parts = (*tables["loops"].values(), *tables["boards"].values())
+        if not tables["loops"] or None in parts or self._astray:
+            return None
+        return Settings.model_validate({key: tables[key] for key in ("loops", "boards")})
 
     def boards(self) -> dict[str, BaseModel]:
         """Return the boards alone; raise `BadConfiguration` with all that is wrong with them."""
@@ -135,10 +152,12 @@ class _Reading:
         """Return each board's settings by the model of its kind."""
         boards: dict[str, BaseModel | None] = {}
         for name, table in self._named("boards"):
-            kind = table.get("kind")
+            kind, boards[name] = table.get("kind"), None
             known = plugins.kinds(plugins.DRIVERS)
             if kind is None:
-                self._blame(("boards", name), f"needs a kind; known: {', '.join(known)}")
+                self._blame(
+                    ("boards", name), f"expected a kind, got none{plugins.nearest('', known)}"
+                )
                 continue
             try:
                 model = plugins.find(plugins.DRIVERS, str(kind)).Settings
@@ -156,10 +175,10 @@ class _Reading:
             loop = loops[name] = self._table(LoopTable, table, ("loops", name))
             if not _LOOP_NAME.fullmatch(name):
                 self._blame(("loops", name), "a loop is named with up to 64 of a-z, A-Z, 0-9, - _")
-            if isinstance(loop, LoopTable):
-                try:
-                    check_parts(loop)
-                except plugins.BadOption as error:
+            whole = isinstance(loop, LoopTable)
+            judged = loop if whole else repaired(LoopTable, table, _STAND_INS)
+            if isinstance(judged, LoopTable):
+                for error in part_errors(judged, whole=whole):
                     self._blame(("loops", name, *error.path), error.text)
         known = {name: each for name, each in loops.items() if isinstance(each, LoopTable)}
         if len(known) == len(loops):
@@ -176,6 +195,7 @@ class _Reading:
             channel = table.get(part)
             board = channel.get("board") if isinstance(channel, Mapping) else None
             if isinstance(board, str) and board not in boards:
+                self._astray = True
                 hint = plugins.nearest(board, boards)
                 self._blame(
                     ("loops", loop, part, "board"), f"no table [boards.{board}] there{hint}"
@@ -200,15 +220,25 @@ class _Reading:
         except ValidationError as error:
             self._explain(error, model, path)
             pruned = without_unknown_keys(error, table)
+            if model is LoopTable:
+                pruned = without_keys_beside(_STAND_INS, error, pruned)
         if pruned != table:  # limits that contradict each other show only in a table without typos
             try:
                 validated(model, pruned)
             except ValidationError as error:
-                self._explain(error, model, path)
+                self._explain(error, model, path, contradictions=True)
         return None
 
-    def _explain(self, error: ValidationError, model: type[BaseModel], path: KeyPath) -> None:
-        for below, text in reasons(error, model):
+    def _explain(
+        self,
+        error: ValidationError,
+        model: type[BaseModel],
+        path: KeyPath,
+        *,
+        contradictions: bool = False,
+    ) -> None:
+        """Blame what `error` complains of; of a mended table only what contradicts itself."""
+        for below, text in reasons(error, model, only="value_error" if contradictions else ""):
             self._blame(path + below, text)
 
     def _blame(self, key: KeyPath, text: str) -> None:

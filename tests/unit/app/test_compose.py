@@ -70,7 +70,7 @@ def test_structure_arx_has_the_orders_that_are_given(minimal):
 
 def test_a_known_gain_has_no_delay(minimal):
     minimal["loops"]["tank"]["model"] = {"delay": 2}
-    with pytest.raises(ConfigError, match="a delay of 2 samples needs structure 'arx'"):
+    with pytest.raises(ConfigError, match="delay: expected 1 unless structure is 'arx', got 2"):
         load(minimal)
 
 

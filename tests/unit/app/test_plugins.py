@@ -66,14 +66,14 @@ def test_a_list_is_taken_for_a_tuple_and_a_whole_number_for_a_float():
 @pytest.mark.parametrize(
     ("options", "path", "text"),
     [
-        ({}, ("reach_s",), "is missing"),
+        ({}, ("reach_s",), "expected a value, got none"),
         ({"reach_s": "1.0"}, ("reach_s",), "expected a valid number, got '1.0'"),
         ({"reach_s": True}, ("reach_s",), "expected a valid number, got True"),
         ({"reach_s": 1.0, "steps": 2.0}, ("steps",), "expected a valid integer, got 2.0"),
         ({"reach_s": 1.0, "loud": 1}, ("loud",), "expected a valid boolean, got 1"),
         ({"reach_s": 1.0, "taps": ["x"]}, ("taps",), "expected a valid number, got ['x']"),
         ({"reach": 1.0}, ("reach",), "unknown key; did you mean 'reach_s'?"),
-        ({"reach_s": -1.0}, ("reach_s",), "must be positive, got -1.0"),
+        ({"reach_s": -1.0}, ("reach_s",), "expected a number above 0, got -1.0"),
         ({"reach_s": 1.0, "steps": 10}, (), "too many steps"),
     ],
 )

@@ -52,8 +52,8 @@ def test_a_loop_has_one_sensor_unless_another_is_given():
         ),
         (
             {"second_sensor": {"board": "daq", "input": "b", "curve": "pt100"}},
-            "second_sensor",
-            "needs pull_up_ohm",
+            "second_sensor.pull_up_ohm",
+            "expected the resistor that a pt100 is read with, got none",
         ),
         ({"disagreement_k": 0.0}, "disagreement_k", "expected"),
     ],

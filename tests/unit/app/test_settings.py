@@ -166,17 +166,20 @@ def test_a_setpoint_that_is_no_temperature_is_refused(minimal, value, came):
         ({"power_max": 1.5}, "power_max: expected at most 1, got 1.5"),
         ({"jump_k": 0}, "jump_k: expected a number above 0, got 0"),
         ({"sensor": "daq"}, 'sensor: expected a table, got "daq"'),
-        ({"sensor": {}}, "sensor.board: is missing"),
+        ({"sensor": {}}, "sensor.board: expected a value, got none"),
         ({"controller": 3}, "controller: expected a table, got 3"),
         ({"controller": "mpc"}, "controller.kind: no controller is called 'mpc'"),
         ({"model": {"n": 2.0}}, "model.n: expected a whole number, got 2.0"),
         ({"estimator": {"kind": "ckv"}}, "estimator.kind: no estimator is called 'ckv'; did you"),
         ({"estimator": {"kind": "ckf", "R3": 1}}, "estimator.R3: unknown key; known: R1, R2, infl"),
-        ({"estimator": {"kind": "vff"}}, "estimator.Sigma0: is missing"),
-        ({"estimator": {"R2": -1.0}}, "estimator.R2: must be positive, got -1.0"),
+        ({"estimator": {"kind": "vff"}}, "estimator.Sigma0: expected a value, got none"),
+        ({"estimator": {"R2": -1.0}}, "estimator.R2: expected a number above 0, got -1.0"),
         ({"estimator": {"theta0": [1.0, 2.0]}}, "estimator.theta0: "),
         ({"estimator": {"theta0": ["1"]}}, "estimator.theta0.0: expected a number"),
-        ({"controller": {"kind": "manual", "power": 2}}, "controller.power: must lie in [0, 1]"),
+        (
+            {"controller": {"kind": "manual", "power": 2}},
+            "controller.power: expected a number in [0, 1]",
+        ),
     ],
 )
 def test_a_bad_key_of_a_loop_is_named_with_what_was_expected(minimal, keys, told):
@@ -202,10 +205,16 @@ def test_a_key_in_another_unit_is_told_the_right_one(minimal, key, value, hint):
 @pytest.mark.parametrize(
     ("keys", "told"),
     [
-        ({"trip_below_c": 70.0}, "trip_below_c 70 must lie below trip_above_c 60"),
-        ({"setpoint_max_c": 65.0}, "set points from -10 to 65 must lie between the trips"),
-        ({"setpoint_c": 60.0}, "setpoint_c 60 must lie from -10 to 60 and below trip_above_c 60"),
-        ({"setpoint_max_c": 30.0}, "setpoint_c 37.5 must lie from -10 to 30"),
+        ({"trip_below_c": 70.0}, "trip_below_c: expected less than trip_above_c (60), got 70"),
+        (
+            {"setpoint_max_c": 65.0},
+            "setpoint_max_c: expected from the least set point (-10) to trip_above_c (60), got 65",
+        ),
+        (
+            {"setpoint_c": 60.0},
+            "setpoint_c: expected from -10 to 60 and below trip_above_c (60), got 60",
+        ),
+        ({"setpoint_max_c": 30.0}, "setpoint_c: expected from -10 to 30 and"),
     ],
 )
 def test_limits_that_contradict_each_other_are_refused(minimal, keys, told):
@@ -217,7 +226,89 @@ def test_a_typo_does_not_hide_limits_that_contradict_each_other(minimal):
     lines = problems(tank(minimal, setpoint_c=70.0, perod_s=1.0))
     assert len(lines) == 2
     assert "perod_s: unknown key; did you mean 'period_s'?" in lines[0]
-    assert "setpoint_c 70 must lie" in lines[1]
+    assert "setpoint_c: expected from -10 to 60 and below trip_above_c (60), got 70" in lines[1]
+
+
+def test_a_bad_value_beside_them_does_not_hide_limits_that_contradict_each_other(minimal):
+    lines = problems(tank(minimal, setpoint_c=70.0, mode="on", model={"n": 0}))
+    assert [line.split(":")[1] for line in lines] == [
+        " loops.tank.mode",
+        " loops.tank.model.n",
+        " loops.tank.setpoint_c",
+    ]
+
+
+def test_limits_of_which_one_is_bad_are_not_judged_by_its_default(minimal):
+    [line] = problems(tank(minimal, setpoint_c=-20.0, trip_below_c="-30"))
+    assert "trip_below_c: expected a number" in line
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        (
+            {
+                "setpoint_c": 75.0,
+                "controller": "adaptve",
+                "estimator": {"kind": "ckf", "R2": -1.0},
+            },
+            ["setpoint_c", "controller.kind", "estimator.R2"],
+        ),
+        (
+            {"controller": {"kind": "adaptive", "calmness": 35.0, "calm": 1, "lags": {"count": 0}}},
+            ["controller.calm", "controller.calmness", "controller.lags.count"],
+        ),
+        (
+            {"mode": "on", "sensor": {"board": "daq", "curve": "lm336"}, "estimator": {"R2": -1.0}},
+            ["mode", "sensor.curve", "estimator.R2"],
+        ),
+        (
+            {"trip_above_c": "hot", "shadow": "pit", "model": {"structure": "ark"}},
+            ["trip_above_c", "model.structure", "shadow.kind"],
+        ),
+        (
+            {"actuator": {"board": "daq", "law": "cube"}, "controller": "mpc"},
+            ["actuator.law", "controller.kind"],
+        ),
+    ],
+)
+def test_a_mistake_in_one_place_does_not_hide_those_in_others(minimal, keys, told):
+    minimal["boards"] = {"daq": {"kind": "simulated"}}
+    found = [line.split(": ")[1] for line in problems(tank(minimal, **keys))]
+    assert sorted(found) == sorted(f"loops.tank.{key}" for key in told)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"controller": {"kind": "adaptve", "action": "cool"}, "shadow": {"action": "cool"}},
+        {"controller": {"kind": "adaptive", "action": "heat-cool"}, "cooler": {"output": 3}},
+        {"shadow": {"kind": "pid", "action": "cool"}, "controller": {"kind": "x"}},
+    ],
+)
+def test_what_follows_from_a_mistake_alone_is_not_told(minimal, keys):
+    minimal["boards"] = {"daq": {"kind": "simulated"}}
+    if "shadow" in keys:
+        keys["shadow"].setdefault("kind", "pid")
+    assert not any("action" in line for line in problems(tank(minimal, **keys)))
+
+
+@pytest.mark.parametrize(("curve", "reference_v"), [("lm335", 5000), ("tmp36", 0.01)])
+def test_a_reference_that_no_converter_has_is_told_at_its_own_key(minimal, curve, reference_v):
+    minimal["boards"] = {"daq": {"kind": "simulated"}}
+    sensor = {"board": "daq", "curve": curve, "reference_v": reference_v}
+    [line] = problems(tank(minimal, sensor=sensor))
+    told = f"expected a converter that can show a room, got {reference_v:g} V"
+    assert line == f"configuration: loops.tank.sensor.reference_v: {told}"
+
+
+def test_a_limit_that_contradicts_another_has_the_line_of_its_key(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text(WHOLE.replace("37.5", "61"))
+    assert problems(path) == [
+        f"{path}:5: loops.tank.setpoint_c: expected from -10 to 60 and below trip_above_c (60), "
+        "got 61"
+    ]
 
 
 def test_a_board_that_is_not_there_is_told_the_nearest_one(minimal):
@@ -234,7 +325,7 @@ def test_a_board_that_is_not_there_is_told_the_nearest_one(minimal):
         ({"loops": {}}, "loops: expected at least one table [loops.NAME], got none"),
         ({"loops": 3}, "loops: expected tables [loops.NAME], got 3"),
         ({"loops": {"tank": 3}}, "loops.tank: expected a table, got 3"),
-        ({"boards": {"daq": {}}}, "boards.daq: needs a kind; known: "),
+        ({"boards": {"daq": {}}}, "boards.daq: expected a kind, got none; known: "),
         ({"boards": {"daq": {"kind": 3}}}, "boards.daq.kind: no driver is called '3'"),
         ({"boards": []}, "boards: expected tables [boards.NAME], got []"),
         ({"lops": {}}, "lops: unknown key; did you mean 'loops'?"),
@@ -263,7 +354,7 @@ def test_everything_wrong_is_told_at_once_with_file_and_line(tmp_path):
     )
     assert problems(path) == [
         f"{path}:2: boards.daq.kind: no driver is called 'simulatd'; did you mean 'simulated'?",
-        f"{path}:4: loops.tank.setpoint_c: is missing",
+        f"{path}:4: loops.tank.setpoint_c: expected a value, got none",
         f"{path}:9: loops.tank.sensor.input: expected text in quotes, got 5",
         f"{path}:5: loops.tank.setpoint_f: unknown key; the unit here is °C: setpoint_c = 37.5",
         f"{path}:15: loops.mash.controller.hysteresis: unknown key; did you mean 'hysteresis_k'?",

@@ -371,7 +371,7 @@ def test_gain_and_holding_power_are_those_of_the_one_in_charge(drive_with):
 @pytest.mark.parametrize("shadow", ["adaptive", {"kind": "adaptive", "calmness": 1.2}])
 def test_a_shadow_of_the_same_kind_is_refused_for_nobody_could_choose(shadow):
     table = {"setpoint_c": 37.5, "trip_above_c": 60.0, "controller": "adaptive", "shadow": shadow}
-    with pytest.raises(ConfigError, match=r"loops\.tank\.shadow: must be another kind"):
+    with pytest.raises(ConfigError, match=r"loops\.tank\.shadow: expected another kind"):
         load({"loops": {"tank": table}})
 
 
@@ -380,7 +380,7 @@ def test_a_shadow_of_the_same_kind_is_refused_for_nobody_could_choose(shadow):
     [
         ("no-such", r"shadow\.kind: no controller is called 'no-such'"),
         ({"kind": "on-off", "width_k": 1.0}, r"shadow\.width_k: unknown key"),
-        ({"kind": "on-off", "hysteresis_k": -1.0}, r"shadow\.hysteresis_k: must be at least 0"),
+        ({"kind": "on-off", "hysteresis_k": -1.0}, r"shadow\.hysteresis_k: expected at least 0"),
         (3, "shadow"),
     ],
 )

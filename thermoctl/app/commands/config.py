@@ -9,13 +9,20 @@ import click
 
 from thermoctl.app.commands.options import Commands, config_option, json_option
 from thermoctl.app.compose import wiring_errors
-from thermoctl.app.configuration.document import BadConfiguration, exposures, read_document
+from thermoctl.app.configuration.document import (
+    BadConfiguration,
+    Problem,
+    exposures,
+    read_document,
+)
 from thermoctl.app.configuration.in_force import in_force
 from thermoctl.app.configuration.new import new
 from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.configuration.toml_text import toml_text
 from thermoctl.app.doubts import doubts
 from thermoctl.app.settings import Settings, default_files, load_all, settings_in
+
+_REST = "how loops and boards go together is checked once this is mended"
 
 
 @click.group(cls=Commands)
@@ -55,10 +62,18 @@ def runnable(files: list[Path]) -> Settings:
         `BadConfiguration`, with everything that is wrong, the wiring included.
     """
     document = read_document(files)
-    settings = settings_in(document)
-    wrong = [document.problem(key, text) for key, text in wiring_errors(settings)]
-    if wrong:
-        raise BadConfiguration(wrong)
+    wrong: list[Problem] = []
+    settings: Settings | None
+    try:
+        settings = settings_in(document)
+    except BadConfiguration as error:
+        wrong += error.problems
+        settings = error.read
+    note = _REST if settings is None else ""
+    if settings is not None:
+        wrong += [document.problem(key, text) for key, text in wiring_errors(settings)]
+    if wrong or settings is None:
+        raise BadConfiguration(wrong, note=note)
     return settings
 
 

@@ -54,11 +54,16 @@ class BadConfiguration(ConfigError):  # noqa: N818 - as its siblings in errors
     ----------
     problems : sequence of Problem
         At least one; repetitions are dropped.
+    read : any, optional
+        What could be read of it all the same; None where a table is missing or bad.
+    note : str
+        What was not looked at, in a line of its own; "" for nothing.
     """
 
-    def __init__(self, problems: Sequence[Problem]) -> None:
+    def __init__(self, problems: Sequence[Problem], read: Any = None, note: str = "") -> None:
         self.problems = tuple(dict.fromkeys(problems))
-        super().__init__("\n".join(map(str, self.problems)))
+        self.read = read
+        super().__init__("\n".join([*map(str, self.problems), *filter(None, [note])]))
 
 
 @dataclass(frozen=True, slots=True)

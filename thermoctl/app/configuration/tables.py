@@ -73,7 +73,7 @@ class SensorTable(Table):
     def _resistive_sensors_need_a_pull_up(self) -> Self:
         if self.curve in ("pt100", "pt1000", "ntc") and self.pull_up_ohm is None:
             raise ValueError(
-                f"curve {self.curve!r} needs pull_up_ohm, the resistor it is read with"
+                f"pull_up_ohm must be the resistor that a {self.curve} is read with, got none"
             )
         return self
 
@@ -104,7 +104,9 @@ class CascadeTable(Table):
     @model_validator(mode="after")
     def _low_below_high(self) -> Self:
         if not self.low_c < self.high_c:
-            raise ValueError(f"low_c {self.low_c:g} must lie below high_c {self.high_c:g}")
+            raise ValueError(
+                f"low_c must be less than high_c ({self.high_c:g}), got {self.low_c:g}"
+            )
         return self
 
 
@@ -205,7 +207,7 @@ class ModelTable(Table):
     @model_validator(mode="after")
     def _a_known_gain_acts_at_once(self) -> Self:
         if self.structure == "known-gain" and self.delay != 1:
-            raise ValueError(f"a delay of {self.delay} samples needs structure 'arx'")
+            raise ValueError(f"delay must be 1 unless structure is 'arx', got {self.delay}")
         return self
 
 
@@ -328,21 +330,19 @@ class LoopTable(Table):
     @model_validator(mode="after")
     def _setpoint_within_limits_within_trips(self) -> Self:
         low_c, high_c = self.setpoint_range_c
-        if not self.trip_below_c < self.trip_above_c:
-            raise ValueError(
-                f"trip_below_c {self.trip_below_c:g} must lie below "
-                f"trip_above_c {self.trip_above_c:g}"
-            )
-        if not self.trip_below_c <= low_c <= high_c <= self.trip_above_c:
-            raise ValueError(
-                f"set points from {low_c:g} to {high_c:g} must lie between the trips "
-                f"{self.trip_below_c:g} and {self.trip_above_c:g}"
-            )
-        if not (low_c <= self.setpoint_c <= high_c and self.setpoint_c < self.trip_above_c):
-            raise ValueError(
-                f"setpoint_c {self.setpoint_c:g} must lie from {low_c:g} to {high_c:g} and "
-                f"below trip_above_c {self.trip_above_c:g}"
-            )
+        coldest_c, hottest_c, held_c = self.trip_below_c, self.trip_above_c, self.setpoint_c
+        trip = f"trip_above_c ({hottest_c:g})"
+        if not coldest_c < hottest_c:
+            raise ValueError(f"trip_below_c must be less than {trip}, got {coldest_c:g}")
+        if not coldest_c <= low_c <= hottest_c:
+            text = f"must be from trip_below_c ({coldest_c:g}) to {trip}, got {low_c:g}"
+            raise ValueError(f"setpoint_min_c {text}")
+        if not low_c <= high_c <= hottest_c:
+            text = f"must be from the least set point ({low_c:g}) to {trip}, got {high_c:g}"
+            raise ValueError(f"setpoint_max_c {text}")
+        if not (low_c <= held_c <= high_c and held_c < hottest_c):
+            text = f"must be from {low_c:g} to {high_c:g} and below {trip}, got {held_c:g}"
+            raise ValueError(f"setpoint_c {text}")
         return self
 
     @property

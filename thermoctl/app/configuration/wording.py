@@ -11,7 +11,7 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from thermoctl.app.configuration.units import other_unit
-from thermoctl.app.plugins import nearest
+from thermoctl.app.plugins import blamed, nearest
 from thermoctl.quantities import is_finite_number
 
 KeyPath = tuple[str, ...]
@@ -58,12 +58,22 @@ def validated(model: type[BaseModel], table: Any) -> BaseModel:
     return model.model_validate_json(json.dumps(table, default=_plain), strict=True)
 
 
-def reasons(error: ValidationError, model: type[BaseModel]) -> list[tuple[KeyPath, str]]:
-    """Return a path below `model` and a sentence for each complaint of `error`."""
+def reasons(
+    error: ValidationError, model: type[BaseModel], only: str = ""
+) -> list[tuple[KeyPath, str]]:
+    """Return path and words of each complaint of `error`, or of those of one type."""
     told = []
     for each in error.errors(include_url=False):
+        if only not in ("", each["type"]):
+            continue
         path = tuple(str(part) for part in each["loc"] if not _TAG.fullmatch(str(part)))
-        told.append((path, _reason(each, path, known_keys(model, path[:-1]))))
+        if each["type"] == "value_error":  # of a whole table: its text begins with the key it means
+            text = str(each["msg"]).removeprefix("Value error, ")
+            written = each["input"] if isinstance(each["input"], Mapping) else ()
+            meant = blamed(ValueError(text), {*known_keys(model, path), *written})
+            told.append((path + meant.path, meant.text))
+        else:
+            told.append((path, _reason(each, path, known_keys(model, path[:-1]))))
     return told
 
 
@@ -117,9 +127,7 @@ def _reason(error: Any, path: KeyPath, known: list[str]) -> str:
     if kind == "extra_forbidden":
         return unknown_key(path[-1], known, value)
     if kind == "missing":
-        return "is missing"
-    if kind == "value_error":
-        return str(error["msg"]).removeprefix("Value error, ")
+        return "expected a value, got none"
     if kind not in _EXPECTED:
         message = str(error["msg"])
         return f"{message[0].lower()}{message[1:]}, got {shown(value)}"
