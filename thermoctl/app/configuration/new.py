@@ -102,7 +102,7 @@ class Answers:
 @click.option("--volume-l", type=_POSITIVE, help="Water in the tank, in litres.")
 @click.option("--heater-w", type=_POSITIVE, help="Rated power of the heater, in W.")
 @click.option("--setpoint-c", type=_NUMBER, help="Temperature to hold, in degC.")
-@click.option("--trip-above-c", type=_NUMBER, help="Heater off for good above this, in degC.")
+@click.option("--trip-above-c", type=_NUMBER, help="Off until acknowledged above this, in degC.")
 @click.option("--mode", type=click.Choice(["off", "auto"]), help="Mode at the first start.")
 @click.option("--resume/--no-resume", default=None, help="Whether a restart goes on.")
 @click.option("--accept-no-dead-man", is_flag=True, help="An independent thermostat is fitted.")
@@ -177,7 +177,7 @@ def _answers(interview: _Interview) -> Answers:
     volume_l = ask("volume_l", "Water in the tank, in litres", usual[0], _POSITIVE)
     heater_w = ask("heater_w", "Rated power of the heater, in W", usual[1], _POSITIVE)
     setpoint_c = ask("setpoint_c", "Temperature to hold, in degC", 37.5, _WATER)
-    trip_c = ask("trip_above_c", "Heater off for good above, in degC", *_trip(setpoint_c))
+    trip_c = ask("trip_above_c", "Heater off until acknowledged above, in degC", *_trip(setpoint_c))
     if not trip_c > setpoint_c:
         raise ConfigError(
             f"expected --trip-above-c above the set point of {setpoint_c:g} degC, got {trip_c:g}"
@@ -244,7 +244,7 @@ def _loop_lines(answers: Answers) -> list[str]:
     return [
         "[loops.tank]",
         _line("setpoint_c", answers.setpoint_c, "degC to hold"),
-        _line("trip_above_c", answers.trip_above_c, "heater off for good above this"),
+        _line("trip_above_c", answers.trip_above_c, "heater off above this until acknowledged"),
         *_trip_below_lines(answers),
         _line("heater_w", answers.heater_w, "so that watts and litres are told"),
         _line("setpoint_max_c", answers.setpoint_max_c, "no set point above this is accepted"),

@@ -255,8 +255,8 @@ class LoopTable(Table):
     """Table ``[loops.NAME]``: what is held, how often, and within which limits."""
 
     setpoint_c: Celsius = Field(description="Temperature to hold.")
-    trip_above_c: Celsius = Field(description="Everything off for good above this.")
-    trip_below_c: Celsius = Field(-10.0, description="Everything off for good below this.")
+    trip_above_c: Celsius = Field(description="All off above this until acknowledged.")
+    trip_below_c: Celsius = Field(-10.0, description="All off below this until acknowledged.")
     setpoint_min_c: Celsius | None = Field(None, description="Least set point; the trip if absent.")
     setpoint_max_c: Celsius | None = Field(
         None, description="Highest set point; the trip if absent."
