@@ -58,13 +58,14 @@ def origin(mind: Mind) -> str | None:
     return told if isinstance(told, str) else None
 
 
-def remembering(charge: Mind, beside: Mind | None, watches: Named) -> Callable[[], Models]:
-    """Return a function that says what minds and `watches` would like kept now."""
-    beliefs = charge.belief, None if beside is None else beside.belief
-    heaters = {}
+def remembering(minds: Iterable[Mind | None], watches: Named) -> Callable[[], Models]:
+    """Return a function that says what `minds` and `watches` would like kept now."""
+    beliefs, heaters = [], {}
+    for mind in minds:
+        beliefs.append(None if mind is None else mind.belief)
     for name, each in watches.items():
         heaters[name] = each.known
-    return partial(_remembered, (charge, beside), beliefs, heaters)
+    return partial(_remembered, minds, beliefs, heaters)
 
 
 def _remembered(

@@ -385,7 +385,7 @@ class Regulator:
             load,
             self._steering.tell(beside),
             origin(charge),
-            remembering(charge, beside, self._watches),
+            remembering((charge, beside), self._watches),
         )
 
     def _emit(self, name: str, **fields: object) -> None:
