@@ -29,7 +29,7 @@ from thermoctl.app.doubts import doubts
 from thermoctl.app.live import Action, Desk, Facts, Keys, LiveModel, LiveScreen, look_for
 from thermoctl.app.live.desk import DISTURBANCES
 from thermoctl.app.live.look import printable
-from thermoctl.app.report import Summary, closing_lines
+from thermoctl.app.report import Summary, closing_lines, off_lines
 from thermoctl.app.settings import Settings
 from thermoctl.errors import Refused
 from thermoctl.ports import Simulated
@@ -112,6 +112,8 @@ def _tell(summary: Summary, options: BenchOptions) -> None:
     if options.as_json:
         sys.stdout.write(json.dumps({"summary": figures}, allow_nan=False) + "\n")
         sys.stdout.flush()
+        for line in off_lines(figures):
+            click.echo(f"thermoctl: {line}", err=True)
         return
     look = look_for(sys.stderr.encoding)
     for line in closing_lines(figures):

@@ -9,7 +9,7 @@ from typing import Any
 
 from thermoctl.app.cycle_record import finite
 from thermoctl.app.live import numbers
-from thermoctl.signals import TRUE_TEMPERATURE, Cycle
+from thermoctl.signals import TRUE_TEMPERATURE, Cycle, State, Step
 from thermoctl.studies.words import duration
 
 SETTLED_K = 0.1
@@ -17,11 +17,12 @@ SETTLED_FOR_S = 60.0
 
 
 class Summary:
-    """Figures of one loop's run, gathered in bounded memory.
+    """Figures of the first loop's run, and how each loop ended, in bounded memory.
 
-    Judged on the true temperature where a simulation knows it. Settled is the first moment from
-    which the temperature stays within 0.1 K of the set point for a minute; deviations count from
-    there on, and a new set point begins anew.
+    Judged on the true temperature where a simulation knows it. The set point is reached at the
+    first moment from which the temperature stays within 0.1 K of it for a minute; deviations count
+    from there on. The loop has settled at the one from which it stays there to the end of the run,
+    a minute at least. A new set point begins anew.
     """
 
     def __init__(self) -> None:
@@ -32,6 +33,7 @@ class Summary:
         self._temperature_c = math.nan
         self._travel = 0.0
         self._power: float | None = None
+        self._ended: dict[str, Step] = {}
         self._begin("", 0.0)
 
     def _begin(self, loop: str, t_s: float) -> None:
@@ -39,13 +41,13 @@ class Summary:
         self._rising: bool | None = None
         self._overshoot_k = 0.0
         self._within_since_s: float | None = None
-        self._settled_s: float | None = None
+        self._reached_s: float | None = None
         self._squares = self._largest_k = 0.0
         self._counted = 0
 
     def add(self, cycle: Cycle) -> None:
-        """Take one finished cycle; only those of the first loop count."""
-        step = cycle.step
+        """Take one finished cycle; of any but the first loop only how it ends counts."""
+        step = self._ended[cycle.loop] = cycle.step
         if self._first is None:
             self._first = cycle
         elif cycle.loop != self._first.loop:
@@ -67,41 +69,69 @@ class Summary:
         if self._rising is None:
             self._rising = deviation_k < 0.0
         self._overshoot_k = max(self._overshoot_k, deviation_k if self._rising else -deviation_k)
-        if self._settled_s is None:
-            if abs(deviation_k) > SETTLED_K:
-                self._within_since_s = None
-            elif self._within_since_s is None:
-                self._within_since_s = t_s
-            elif t_s - self._within_since_s >= SETTLED_FOR_S:
-                self._settled_s = self._within_since_s - self._start_s
+        if abs(deviation_k) > SETTLED_K:
+            self._within_since_s = None
+        elif self._within_since_s is None:
+            self._within_since_s = t_s
+        if self._reached_s is None:
+            self._reached_s = self._settled_s(t_s)
             return
         self._squares += deviation_k**2
         self._largest_k = max(self._largest_k, abs(deviation_k))
         self._counted += 1
 
+    def _settled_s(self, t_s: float) -> float | None:
+        """Return how long after the set point was given it came to stay, seen from `t_s`."""
+        since_s = self._within_since_s
+        if since_s is None or t_s - since_s < SETTLED_FOR_S:
+            return None
+        return since_s - self._start_s
+
     def as_dict(self) -> dict[str, Any]:
         """Return the figures; None for what has not happened."""
         first, last = self._first, self._last
         duration_s = last.step.t_s - first.step.t_s if first and last else 0.0
-        settled = self._counted > 0
+        reached = self._counted > 0
         return {
             "duration_s": round(duration_s, 3),
             "steps": self._steps,
             "missed": last.missed if last else 0,
             "overshoot_k": round(self._overshoot_k, 4),
-            "settled_s": self._settled_s,
+            "reached_s": self._reached_s,
+            "settled_s": self._settled_s(last.step.t_s) if last else None,
             "deviation_mk": round(1e3 * math.sqrt(self._squares / self._counted), 2)
-            if settled
+            if reached
             else None,
-            "max_deviation_mk": round(1e3 * self._largest_k, 2) if settled else None,
+            "max_deviation_mk": round(1e3 * self._largest_k, 2) if reached else None,
             "travel_per_min": round(60.0 * self._travel / duration_s, 3) if duration_s else None,
             "final_temperature_c": finite(self._temperature_c),
+            "latched": any(step.state is State.LATCHED for step in self._ended.values()),
+            "ended": {name: _end(step) for name, step in self._ended.items()},
             "wall_s": round(time.monotonic() - self._wall_s, 3),
         }
 
 
+def _end(step: Step) -> dict[str, Any]:
+    """Return how a loop was left."""
+    alarms = [alarm.code for alarm in step.alarms]
+    return {"mode": step.mode.value, "state": step.state.value, "alarms": alarms}
+
+
+def off_lines(figures: Mapping[str, Any]) -> list[str]:
+    """Return a line for each loop that a fault had switched off when the run ended."""
+    until = {
+        State.LATCHED.value: "off until acknowledged",
+        State.SAFE.value: "off until readings are good",
+    }
+    return [
+        f"{name} ended {end['state'].upper()}, {until[end['state']]}: {', '.join(end['alarms'])}"
+        for name, end in figures["ended"].items()
+        if end["state"] in until
+    ]
+
+
 def closing_lines(figures: Mapping[str, Any]) -> list[str]:
-    """Return what a person wants to know of a run that has ended, in four lines.
+    """Return what a person wants to know of a run that has ended, line by line.
 
     Parameters
     ----------
@@ -121,21 +151,25 @@ def closing_lines(figures: Mapping[str, Any]) -> list[str]:
         f"Settled   {_settled(figures)}, {overshoot}",
         f"Held      {_held(figures)}",
         f"Ended at  {final}; power moved {moved} full ranges a minute",
+        *(f"Off       {line}" for line in off_lines(figures)),
     ]
 
 
 def _settled(figures: Mapping[str, Any]) -> str:
-    """Return when the set point in force was reached for good."""
-    settled_s = figures["settled_s"]
-    if settled_s is not None:
-        return f"after {duration(settled_s)}"
-    return f"never: not within ±{SETTLED_K:g} K of the set point for {SETTLED_FOR_S:g} s"
+    """Return when the set point in force was reached, and from when on it was kept."""
+    settled_s, reached_s = figures["settled_s"], figures["reached_s"]
+    if reached_s is None:
+        return f"never: not within ±{SETTLED_K:g} K of the set point for {SETTLED_FOR_S:g} s"
+    settled = "never" if settled_s is None else f"after {duration(settled_s)}"
+    if settled_s == reached_s:
+        return settled
+    return f"{settled}; first there after {duration(reached_s)}"
 
 
 def _held(figures: Mapping[str, Any]) -> str:
-    """Return how well it held after it had settled."""
+    """Return how well it held once it had been reached."""
     if figures["deviation_mk"] is None:
-        return "not judged before it has settled"
+        return "not judged before it was reached"
     deviation, largest = (
         numbers.difference(1e-3 * figures[name]).lstrip("+")
         for name in ("deviation_mk", "max_deviation_mk")
