@@ -35,7 +35,7 @@ def test_a_day_of_an_operator(daemon):
     rows = [line.split(" : ") for line in shown.stdout.splitlines()]
     assert len({len(name) for name, _ in rows}) == 1  # the colons stand below each other
     assert {name.strip(): value for name, value in rows}["Set point"] == "37.50 °C"
-    assert daemon.ask("set", "40").stdout == "tank : set point 40.00 °C\n"
+    assert daemon.ask("set", "40").stdout == "tank: set point 40.00 °C\n"
     assert daemon.ask("get", "setpoint_c").stdout == "40.0\n"
     early = daemon.ask("output", "30%")
     assert (early.returncode, "manual" in early.stderr) == (1, True)

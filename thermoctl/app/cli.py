@@ -89,7 +89,11 @@ _EXAMPLES: Final = examples(
 )
 @click.option("--duration", type=DURATION, default=math.inf, help="End after this: 10m, 1h, ...")
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of the simulation.")
-@click.option("--no-history", is_flag=True, help="Do not record the bench test.")
+@click.option(
+    "--no-history",
+    is_flag=True,
+    help="Do not record the bench test in sim.sqlite of the state folder.",
+)
 @state_option
 @click.option("--json", "as_json", is_flag=True, help="JSON lines, also on a terminal.")
 @click.pass_context

@@ -8,6 +8,7 @@ client, opens the terminal as it would open the serial port.
 from __future__ import annotations
 
 import contextlib
+import errno
 import math
 import os
 import select
@@ -217,6 +218,9 @@ def terminal(link: Path) -> Iterator[int]:
         os.set_blocking(ours, False)
         if link.is_symlink():
             link.unlink()  # left behind by an earlier run
+        elif link.exists():
+            text = "expected a path that is free, got one where something is"
+            raise FileExistsError(errno.EEXIST, text, str(link))
         try:
             link.symlink_to(os.ttyname(theirs))
         except OSError as error:  # it names the terminal, which nobody asked for
@@ -293,8 +297,10 @@ def simulate_thermodaq(
     OSError
         When the terminal or the link cannot be made.
     """
-    with contextlib.closing(board_for(firmware, seed, report)) as board:
+    with (
+        terminal(link) as descriptor,
+        contextlib.closing(board_for(firmware, seed, report)) as board,
+    ):
         device = wired(board, parameters, seed, wiring)
-        with terminal(link) as descriptor:
-            report(f"{link} is the board; set port to it")
-            serve(device, descriptor, stop, duration_s)
+        report(f"{link} is the board; set port to it")
+        serve(device, descriptor, stop, duration_s)

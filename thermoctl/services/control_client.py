@@ -186,6 +186,9 @@ def _connected(paths: Sequence[Path]) -> socket.socket:
         else:
             return connection
     looked = " or ".join(str(path) for path in paths)
+    for path in paths:
+        if path.exists() and not path.is_socket():
+            raise NotRunning(f"expected the socket of a running daemon, got another file: {path}")
     raise NotRunning(f"expected a running daemon at {looked}, found none")
 
 

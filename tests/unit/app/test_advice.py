@@ -27,7 +27,7 @@ def test_every_alarm_about_sensor_heater_and_limits_has_its_advice(family):
 def test_an_alarm_is_a_line_and_what_it_means_another():
     told = _described(ROW | {"active": True})
     assert told == [
-        "tank : sensor.open since noon: an open circuit",
+        "tank: sensor.open since noon: an open circuit",
         f"    {ADVICE['sensor.open']}",
     ]
     assert _described(ROW | {"active": False})[0].endswith(" (over, not acknowledged)")

@@ -47,6 +47,10 @@ def test_a_ramp_says_where_it_is_while_the_controller_follows_it(record):
     assert rows(record | way | {"reference_c": 40.0})["Set point"] == "40.00 °C"
 
 
+def test_the_last_cycle_is_told_by_how_long_ago_it_was(record):
+    assert rows(record)["Last cycle"] == "0.2 s ago"
+
+
 def test_a_line_of_a_cycle_says_where_the_ramp_is_and_where_it_leads(record):
     way = {"setpoint_c": 40.0, "reference_c": 25.8}
     assert "set  40.00 °C, ramp at 25.80 °C  power" in _line(record | way)

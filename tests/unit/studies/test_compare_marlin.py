@@ -185,7 +185,7 @@ def test_simple_pid_has_the_gains_of_the_lab_on_a_lab():
     ("text", "words"),
     [
         ("marlin-mpc:smoothing=1.5", "at most 1, got 1.5"),
-        ("marlin-mpc:horizon_s=0.0", "positive, got 0"),
+        ("marlin-mpc:horizon_s=0.0", "a number above 0, got 0"),
         ("marlin-mpc:horizon=2", "unknown key"),
     ],
 )

@@ -11,9 +11,11 @@ from typing import Any
 import click
 
 from thermoctl.app.advice import advice_for
+from thermoctl.app.commands.completion import codes
 from thermoctl.app.commands.options import (
     Commands,
     config_option,
+    examples,
     json_option,
     loop_option,
     socket_option,
@@ -77,36 +79,44 @@ def _described(row: Mapping[str, Any]) -> list[str]:
     since = row["since"] or "unknown"
     advice = advice_for(row["code"])
     text = numbers.plain(numbers.sentence(row["text"]))
-    told = f"{row['loop']} : {row['code']} since {since}: {text}{over}"
+    told = f"{row['loop']}: {row['code']} since {since}: {text}{over}"
     return [told, f"    {advice}"] if advice else [told]
 
 
-@alarms.command()
+@alarms.command(epilog=examples("thermoctl alarms ack", "thermoctl alarms ack sensor.disagree"))
+@click.argument("code", required=False, shell_complete=codes)
 @config_option
 @state_option
 @socket_option
 @loop_option
 @json_option
 def ack(
+    code: str | None,
     configs: tuple[Path, ...],
     state: Path | None,
     socket: Path | None,
     loop: str | None,
     as_json: bool,
 ) -> None:
-    """Acknowledge, and let a latched loop heat again once its cause is gone."""
+    """Acknowledge, and let a latched loop heat again once its cause is gone.
+
+    CODE is one that `alarms` lists; all of them when left out.
+    """
     client = _daemon(configs, state, socket)
     if client is not None:
         with client:
-            patience_s = float(client.ask("status")["patience_s"])
-            rows = client.ask("ack", patience_s + _REPLY_S, loop=loop)["acknowledged"]
-        _tell([row | {"acknowledged": True} for row in rows], "no alarm", as_json)
+            rows = _acknowledged(client, code, loop)
+        _tell([{**row, "acknowledged": True} for row in rows], "no alarm", as_json)
         return
     settings = _left_settings(configs)
     if loop is not None:
         settings.loop(loop)
     directory = state_of_daemon(settings, state)
     latches = {n: v for n, v in _latches(settings, directory).items() if loop in (None, n)}
+    latched = [latch.code for latch, _ in latches.values()]
+    if code is not None and code not in latched:
+        raise _no_such(code, latched)
+    latches = {n: v for n, v in latches.items() if code in (None, v[0].code)}
     for name, (latch, store) in latches.items():
         store.clear(name)
         if _running(directory) and _comes_back(store, name):
@@ -117,13 +127,33 @@ def ack(
     _tell(rows, "no loop is latched", as_json)
 
 
+def _acknowledged(
+    client: ControlClient, code: str | None, loop: str | None
+) -> list[Mapping[str, Any]]:
+    """Return the alarms that were acknowledged, by the loops that have them."""
+    patience_s = float(client.ask("status")["patience_s"]) + _REPLY_S
+    if code is None:
+        return list(client.ask("ack", patience_s, loop=loop)["acknowledged"])
+    rows = client.ask("alarms", loop=loop)["alarms"]
+    meant = dict.fromkeys(row["loop"] for row in rows if row["code"] == code)
+    if not meant:
+        raise _no_such(code, [row["code"] for row in rows])
+    asked = (client.ask("ack", patience_s, code=code, loop=name) for name in meant)
+    return [row for reply in asked for row in reply["acknowledged"]]
+
+
+def _no_such(code: str, known: Sequence[str]) -> Refused:
+    there = f"one of {', '.join(dict.fromkeys(known))}" if known else "none, for there is no alarm"
+    return Refused(f"expected {there}, got {code!r}")
+
+
 def _tell(rows: Sequence[Mapping[str, Any]], none: str, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(rows))
     elif not rows:
         click.echo(none, err=True)
     for row in () if as_json else rows:
-        click.echo(f"{row['loop']} : {row['code']} acknowledged")
+        click.echo(f"{row['loop']}: {row['code']} acknowledged")
 
 
 # -- a daemon that runs ----------------------------------------------------------------------------

@@ -40,6 +40,11 @@ def loops(context: click.Context, parameter: click.Parameter, typed: str) -> lis
     return _beginning(typed, [loop["loop"] for loop in _loops(context)])
 
 
+def codes(context: click.Context, parameter: click.Parameter, typed: str) -> list[str]:
+    """Return the alarms of the running daemon."""
+    return _beginning(typed, [code for loop in _loops(context) for code in loop.get("alarms", ())])
+
+
 def keys(context: click.Context, parameter: click.Parameter, typed: str) -> list[str]:
     """Return what ``get`` may be asked for."""
     return _beginning(typed, [key for loop in _loops(context) for key in loop])

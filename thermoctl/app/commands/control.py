@@ -81,14 +81,19 @@ def _mode(text: str) -> str:
 
 def _rate(text: str) -> float:
     """Return a rate in K/min, written ``2/min``, ``2K/min`` or ``30/h``; else ``ValueError``."""
-    match = re.fullmatch(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(?:K|°C|degC)?\s*/\s*(min|h)\s*", text)
+    match = re.fullmatch(
+        r"\s*((?:\d+(?:\.\d*)?|\.\d+)(?:e\+?\d+)?)\s*(?:K|°C|degC)?\s*/\s*(min|h)\s*", text
+    )
     rate_k_per_min = math.nan if match is None else float(match[1]) / _MINUTES[match[2]]
-    if not rate_k_per_min > 0.0:
-        raise ValueError(f"expected a rate above 0 a min or h such as 2/min or 30K/h, got {text!r}")
+    if not 0.0 < rate_k_per_min < math.inf:
+        raise ValueError(
+            f"expected a rate above 0 in K per minute or hour, such as 2/min or 30K/h, got {text!r}"
+        )
     return rate_k_per_min
 
 
-_TEMPERATURE, _POWER = Parsed("temperature", _temperature), Parsed("power", _power)
+_TEMPERATURE = Parsed("temperature", lambda text: (text, _temperature(text)))
+_POWER = Parsed("power", _power)
 _RATE = Parsed("rate", _rate)
 
 
@@ -145,16 +150,26 @@ def get(key: str, loop: str | None, socket: Path | None, as_json: bool) -> None:
         "thermoctl set 65.0", "thermoctl set 149F", "thermoctl set 65 --ramp 2/min --loop tank"
     ),
 )
-@click.argument("value_c", metavar="TEMPERATURE", type=_TEMPERATURE)
+@click.argument("value", metavar="TEMPERATURE", type=_TEMPERATURE)
 @click.option("--ramp", type=_RATE, help="Go there at this rate: 2/min, 30K/h.")
 @loop_option
 @socket_option
 @json_option
 def set_command(
-    value_c: float, ramp: float | None, loop: str | None, socket: Path | None, as_json: bool
+    value: tuple[str, float],
+    ramp: float | None,
+    loop: str | None,
+    socket: Path | None,
+    as_json: bool,
 ) -> None:
     """Hold another temperature, in °C; at once, unless a rate limits it."""
-    told = _asked(socket, "set", loop=loop, value_c=value_c, rate_k_per_min=ramp)
+    typed, value_c = value
+    try:
+        told = _asked(socket, "set", loop=loop, value_c=value_c, rate_k_per_min=ramp)
+    except Refused as error:
+        if typed.strip().upper().endswith(("K", "F")):
+            raise Refused(f"{error}; {typed} is {value_c:g} °C") from error
+        raise
     at = "" if ramp is None else f", at {ramp:.3g} K/min"
     words = f"set point {numbers.plain(numbers.temperature(told['setpoint_c']))}{at}"
     _tell(told, as_json, lambda: words)
@@ -287,7 +302,7 @@ def _content(told: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _tell(told: Mapping[str, Any], as_json: bool, words: Callable[[], str]) -> None:
-    click.echo(json.dumps(_content(told)) if as_json else f"{told['loop']} : {words()}")
+    click.echo(json.dumps(_content(told)) if as_json else f"{told['loop']}: {words()}")
 
 
 # -- words -----------------------------------------------------------------------------------------
@@ -309,7 +324,7 @@ def _described(record: Mapping[str, Any]) -> str:
         "Controller": record["controller"],
         **_shadow(record),
         "Alarms": " ".join(record["alarms"]) or "none",
-        "Age": numbers.age(record["age_s"]),
+        "Last cycle": f"{numbers.age(record['age_s'])} ago",
         "Cycles missed": record["missed"],
     }
     lines = [*rows.items(), *insight_lines(record.get("insight"))]

@@ -31,5 +31,5 @@ def forget(loop: str, configs: tuple[Path, ...], state: Path | None) -> int:
         store = LearnedStore(directory)
         there = store.forget(name)
     path = store.path_of(name)
-    click.echo(f"{name} : forgotten; {path} is gone" if there else f"{name} : no model in {path}")
+    click.echo(f"{name}: forgotten; {path} is gone" if there else f"{name}: no model in {path}")
     return 0

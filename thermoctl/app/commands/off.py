@@ -52,5 +52,5 @@ def _switch_off(name: str, settings: BaseModel) -> bool:
     except DriverError as error:
         click.echo(f"thermoctl: {name}: expected a board that takes power 0: {error}", err=True)
         return False
-    click.echo(f"{name} : power 0, {identity.kind} {identity.name}")
+    click.echo(f"{name}: power 0, {identity.kind} {identity.name}")
     return True

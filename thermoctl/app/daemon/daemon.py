@@ -25,7 +25,7 @@ from thermoctl.app.daemon.resuming import Resumption, kept_latches
 from thermoctl.app.doubts import doubts
 from thermoctl.app.parts import law_of_kind
 from thermoctl.app.settings import Settings, default_files, load_all
-from thermoctl.errors import ConfigError
+from thermoctl.errors import ConfigError, Unavailable
 from thermoctl.runtime.clock import MonotonicClock
 from thermoctl.services.control_place import ControlPlace, checked, mode_for, own_path
 from thermoctl.services.control_socket import ControlSocket
@@ -130,6 +130,8 @@ class Daemon:
         self._on_terminal = os.isatty(0)
 
     def _control_socket(self, state: Path, given: Path | None) -> ControlSocket:
+        if given is not None and not given.absolute().parent.is_dir():
+            raise Unavailable(f"expected a folder for --socket {given}, got none at its parent")
         place = ControlPlace(own_path() if given is None else checked(given), mode_for())
         periods_s = {name: table.period_s for name, table in self._settings.loops.items()}
         clerk = Clerk(

@@ -27,7 +27,7 @@ def call(store, loop="tank"):
 
 def test_what_was_learnt_is_gone_and_the_file_named(store):
     told = call(store)
-    assert "tank : forgotten" in told.output
+    assert "tank: forgotten" in told.output
     assert str(store.path_of("tank")) in told.output
     assert store.load("tank") == ({}, None)
 
