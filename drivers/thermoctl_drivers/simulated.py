@@ -71,7 +71,7 @@ class SimulatedSettings(BaseModel):
     )
     second_lag_s: float = Field(6.0, ge=0.5, le=120.0, description="Its lag, in s.")
     second_gain_error: float = Field(
-        0.0, ge=-0.05, le=0.05, description="Its relative error; .001 is 0.3 K in warm water."
+        0.0, ge=-0.05, le=0.05, description="Its relative error; 0.001 is 0.3 K in warm water."
     )
     tolerances: float = Field(
         0.0, ge=0.0, le=0.3, description="Spread of what varies between specimens; 0.1 is 10 %."

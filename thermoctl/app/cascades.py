@@ -1,4 +1,4 @@
-"""Loops that lead loops: what keeps them from it, and what follows is like."""
+"""Cascades: why one loop may not lead another, and how a follower is set up."""
 
 from __future__ import annotations
 

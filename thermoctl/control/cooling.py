@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 RATIO_MIN, RATIO_MAX = 0.02, 10.0
-"""What a cooler may take out at full power over what the heater beside it brings in."""
+"""Bounds of the cooling ratio: what a cooler takes out at full power over what the heater beside it
+brings in."""
 
 
 def heat_of(power: float, ratio: float) -> float:

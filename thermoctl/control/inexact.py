@@ -9,13 +9,13 @@ from thermoctl.ports import Situation
 from thermoctl.quantities import clamp
 
 INEXACT_S, INEXACT = 30.0, 0.1
-"""How far outputs are off their commands is averaged over such a time; one that gives less by more
-than that share is limited, and not inexact."""
+"""Time constant in s of the mean error of an output, and the largest error in power that counts. An
+output that gives less by more than that is limited, not inexact."""
 PULSES_S = 900.0
-"""An output that has given far more than its command is taken for a relay for so long; where 2 % of
-power hold a plant, one of 10 s rests for eight minutes."""
+"""Time in s for which an output that has given far more than its command is taken for a relay;
+where 2 % of power hold a plant, one of 10 s rests for eight minutes."""
 AHEAD_S = 60.0
-"""No output is ahead of its commands by more than this, in seconds of full power."""
+"""Most heat, in s of full power, that an output is taken to be ahead of its commands."""
 
 
 class Inexact(NamedTuple):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 APPEARS_AFTER = 3
-"""So many samples in a row make a condition stand."""
+"""Number of samples in a row that make a condition stand."""
 GONE_AFTER = 60
-"""So many samples in a row without it end it."""
+"""Number of samples in a row without it that end it."""
 
 
 @dataclass(frozen=True, slots=True)

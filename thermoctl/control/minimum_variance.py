@@ -21,7 +21,7 @@ from thermoctl.signals import Beliefs
 
 RIDE_MAX_S = 60.0
 HOLDING_SD_MAX = 0.05
-"""A holding power is told when its standard deviation is at most this: within +-.1 at two."""
+"""Largest standard deviation with which a holding power is reported: within +-0.1 at two."""
 
 
 @dataclass(frozen=True, slots=True)

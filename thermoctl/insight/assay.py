@@ -23,13 +23,14 @@ from thermoctl.insight.rows import Known
 from thermoctl.quantities import Array
 
 NOISE_ORDER = 40
-"""Past disturbances in the autoregression of the noise."""
+"""Number of past disturbances in the autoregression of the noise."""
 
 SKIPPED_LAGS = 4.0
-"""For so many lags it shows that what was given before is not known."""
+"""Time in lags that is left out at the beginning: power from before it, which is unknown, still
+shows."""
 
 LEVEL_K = 1.5
-"""A temperature that moved farther than this shows how the loss grows with it."""
+"""Range of temperatures in K beyond which they show how the loss grows with them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

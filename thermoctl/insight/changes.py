@@ -24,31 +24,33 @@ from thermoctl.insight.lagging import Lagging
 from thermoctl.quantities import Array
 
 SPAN_S, SPAN_LAGS = 60.0, 4.0
-"""The short time is so long, and at least so many lags."""
+"""Length of the short time: in s and in lags, the longer of the two."""
 BLOCKS = 12
-"""The short time is divided into so many blocks, each the median of its samples."""
+"""Number of blocks in the short time; each is the median of its samples."""
 LONG, BASE = 5, 10
-"""The long time, and the line, in short ones."""
+"""Length of the long time, and of the line, in short times."""
 SIGMAS = 6.0
-"""A deviation is none below so many of its usual ones."""
+"""Least deviation that counts, in usual ones."""
 NOISES = 5.0
-"""Nor below so many times the noise of a reading."""
+"""Least deviation that counts, in standard deviations of a reading."""
 FRESH, FRESH_TIMES = 2, 2.0
 """What is usual is known after as many blocks as the line has. Before that, and after so many short
 times, a deviation has to be so many times as large."""
 FLAT, FLAT_USUAL = 0.05, 0.5
-"""What grows in a short time by less than this share of itself, and this much of what is usual, is
-over."""
+"""Largest growth in a short time for a change to be over: a share of the change itself, and one of
+the usual deviation."""
 LASTING = 6
-"""What still slopes after so many short times lasts."""
+"""Number of short times after which a change that still slopes is a lasting one."""
 SLOPING = 0.3
-"""Then it is no step if it grew by more than this share of itself meanwhile."""
+"""Growth meanwhile, as a share of the change, beyond which it is no step."""
 STILL_K = 1.0
-"""Through a past that moved farther than this no line is laid: the loss has changed with it."""
+"""Largest move in K of the past through which a line is fitted: beyond it the loss has changed
+too."""
 FELT = 0.2
 """Share of the lag after which a change of the water is felt."""
 GAIN_LOW, GAIN_HIGH = 0.3, 4.0
-"""Rise over what the heater should have given: between them it is the gain that is wrong."""
+"""Bounds of the rise over what the heater should have given, between which it is the gain that is
+wrong."""
 
 
 @dataclass(frozen=True, slots=True)

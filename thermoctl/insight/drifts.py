@@ -16,11 +16,12 @@ from thermoctl.insight.changes import Usual
 from thermoctl.insight.rows import Known
 
 SIGMAS = 3.0
-"""A drift is beyond so many standard deviations."""
+"""Standard deviations beyond which there is a drift."""
 HELD_BACK = 2
-"""Values enter a baseline so many times later than they are compared: a drift is named before."""
+"""Number of recent spans by which a baseline takes values later than they are compared, so that a
+drift is named before it is learnt."""
 RELEASED = 0.5
-"""It ends when less than this share of what names it is left."""
+"""Share of what names a drift below which it ends."""
 
 
 @dataclass(frozen=True, slots=True)

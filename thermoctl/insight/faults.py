@@ -19,19 +19,20 @@ from thermoctl.insight.wording import plain
 ELEMENT, LOSS, WATER, WIRING = "element.weak", "loss.up", "water.low", "wiring.noisy"
 
 TURN_S, TURN_LAGS = 300.0, 15.0
-"""Power and noise are looked at after so long, and after so many lags."""
+"""Time from one look at power and noise to the next: in s and in lags, the longer of the two."""
 LEARNT, MEMORY, RECENT = 4, 24, 2
-"""Such turns that a baseline is learnt from, followed over, and compared with."""
+"""Number of such turns that a baseline is learnt from, followed over, and compared with."""
 POWER_UP, POWER_LEAST = 0.2, 0.02
-"""More power to hold, as a share and as a fraction of full power."""
+"""Increase of the holding power that is a drift: as a share of it, and as a fraction of full
+power."""
 NOISE_UP = 1.0
-"""More noise, as a share: twice as much."""
+"""Increase of the noise that is a drift, as a share: twice as much."""
 GAIN_UP, GAIN_DOWN = 0.25, -0.2
-"""Gain of a move, as a share."""
+"""Change of the gain of a move that is a drift, as a share."""
 UNLIKE = 0.06
-"""Two moves that differ give gains that differ by so much: the glass follows later."""
+"""Share by which gains of unlike moves differ on an unchanged plant: the glass follows later."""
 NORMAL_AFTER = 48
-"""A power to hold that stays up for so many turns is the usual one from then on."""
+"""Number of turns after which a holding power that stays up is the usual one."""
 
 
 Words = Callable[[Compared], str]

@@ -8,10 +8,10 @@ from thermoctl.insight.values import Gate
 from thermoctl.signals import PlantBelief
 
 LINGERS_S = 30.0
-"""A sample that taught something keeps the word so long."""
+"""Time in s for which learning is reported after a sample that taught something."""
 
 HELD_LAGS = 5.0
-"""For so many lags after a jump nothing counts as evidence; the bank keeps the same."""
+"""Time after a jump in lags in which nothing counts as evidence; the bank keeps the same."""
 
 
 class GateWatch:

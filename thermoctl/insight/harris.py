@@ -24,13 +24,13 @@ import numpy as np
 from thermoctl.quantities import Array
 
 ORDER = 30
-"""Past errors in the autoregression."""
+"""Number of past errors in the autoregression."""
 
 LONGEST = 600
-"""Weights of the moving average that are looked at."""
+"""Largest number of weights of the moving average that are looked at."""
 
 FEWEST = 10
-"""Samples for each of them at least."""
+"""Least number of samples for each of them."""
 
 
 @dataclass(frozen=True, slots=True)

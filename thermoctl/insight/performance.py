@@ -18,23 +18,23 @@ from thermoctl.insight.wording import plain
 from thermoctl.quantities import Array
 
 SHORTEST_S, SHORTEST_LAGS = 1_800.0, 100.0
-"""A stretch is judged that is so long, and at least so many lags."""
+"""Least length of a stretch that is judged: in s and in lags, the longer of the two."""
 LONGEST = 3_600
-"""Samples that are judged at most: the newest ones."""
+"""Largest number of samples that are judged: the newest ones."""
 FEWEST = 600
-"""And at least."""
+"""Least number of samples that are judged."""
 TURN_S = 60.0
 """Time from one judgement to the next."""
 AT_BOUND = 0.05
-"""A power that is at a bound for a larger share of the time is limited."""
+"""Share of the time at a bound beyond which the power is what limits."""
 NEAR = 1e-3
-"""A power no farther from a bound than this is at it."""
+"""Largest distance from a bound at which a power is at it."""
 STEPS = 1.5
-"""A deviation below so many steps of the sensor is made of them."""
+"""Deviation, in steps of the sensor, below which these are what limits."""
 NOISY = 0.5
-"""Noise that is a larger share of the variance than this is what limits."""
+"""Share of noise in the variance beyond which it is what limits."""
 CLOSE = 1.25
-"""A deviation of so many times the bound is close to it."""
+"""Ratio of the deviation to the bound below which it is close to it."""
 
 
 def delay_samples(lag_s: float, period_s: float) -> int:

@@ -15,13 +15,14 @@ from thermoctl.insight.samples import Samples
 from thermoctl.quantities import Array
 
 WINDOW_S, WINDOW_LAGS, WINDOW = 1_800.0, 100.0, 600
-"""Noise is learnt from a stretch at rest that is so long, so many lags, and so many samples."""
+"""Length of the stretch at rest that noise is learnt from: in s, in lags and in samples, the
+longest of the three."""
 SETTLED_LAGS = 10.0
-"""A move is assayed when the loop has been at rest for so many lags."""
+"""Time at rest, in lags, after which a move is assayed."""
 BEFORE_LAGS = 5.0
-"""Its stretch begins so many lags before it, where there are samples of that time."""
+"""Time before a move, in lags, at which its stretch begins, where there are samples of it."""
 SURE = 0.1
-"""A gain whose standard deviation is a larger share of it says nothing of a move."""
+"""Relative standard deviation of a gain from which on it says nothing of a move."""
 
 
 class Reckoning:

@@ -7,13 +7,14 @@ import math
 from thermoctl.signals import Mode, Quality, State, Step
 
 BAND_K, BAND_NOISES = 0.3, 10.0
-"""At rest the reading is no farther from the set point than the larger of the two."""
+"""Largest distance from the set point at rest: in K and in deviations of the noise, the larger of
+the two."""
 
 QUIET_S = 60.0
-"""A rest that is shorter does not part one move from the next."""
+"""Length in s below which a rest does not part one move from the next."""
 
 MOVED_K = 0.05
-"""A set point that moves by less moves nothing."""
+"""Least move in K of a set point that counts."""
 
 
 class Rest:

@@ -13,9 +13,10 @@ from thermoctl.insight.values import Limit, Performance
 from thermoctl.insight.wording import plain
 
 WAIT_S, WAIT_LAGS = 3_600.0, 100.0
-"""A loop that came to its set point so long ago, and is not at rest yet, is restless."""
+"""Time at the set point after which a loop that is not at rest is restless: in s and in lags, the
+longer of the two."""
 JUDGED = 0.5
-"""The later part of that time is judged."""
+"""Share of that time that is judged, the later part."""
 TURN_S = 60.0
 """Time from one judgement to the next."""
 

@@ -18,10 +18,10 @@ NOT_YET = "not known yet"
 _SIGMAS = 2.0
 
 VAGUE_POWER = 0.5
-"""A power to hold that may be off by so much of full power says nothing of the plant."""
+"""Error bar of a holding power, as a fraction of full power, beyond which it is not known."""
 
 VAGUE_LAG = 10.0
-"""A lag that may be so many times another one is what was assumed beforehand, and not learnt."""
+"""Ratio of the quantiles of a lag from which on it is assumed and not learnt."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,13 +11,13 @@ from thermoctl.insight.assay import Stretch
 from thermoctl.quantities import Array
 
 PER_LAG = 20
-"""Samples in a lag are enough."""
+"""Number of samples in a lag that are enough."""
 FINEST_S = 0.5
-"""Samples closer than this are taken together as they come."""
+"""Time in s over which closer samples are taken together as they come."""
 KEPT_S, KEPT_LAGS, KEPT = 7_200.0, 400.0, 2_400
-"""What is kept: so long, and at least so many lags and samples."""
+"""What is kept: in s, in lags and in samples, the most of the three."""
 BRIDGED = 5
-"""Readings that may be missing in a row; more of them break a stretch."""
+"""Largest number of readings in a row that may be missing; more of them break a stretch."""
 
 
 class Samples:

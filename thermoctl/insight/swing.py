@@ -15,11 +15,12 @@ from thermoctl.insight.wording import plain
 from thermoctl.quantities import Array
 
 SWING = 0.5
-"""A loop whose error is so alike after a turn, and so unlike after half of one, swings."""
+"""A loop swings when the autocorrelation of its error is above SWING after a period, and below
+-SWING after half of one."""
 TURNS = 4
-"""Over so many turns a cycle is taken to keep step; after them it may begin anew."""
+"""Number of periods over which a cycle keeps its phase; then it may begin anew."""
 NOT_MADE = 0.5
-"""Of a cycle that the power makes it can have made at least this share."""
+"""Share of a cycle that the power can have made, below which it has not made it."""
 
 
 @dataclass(frozen=True, slots=True)

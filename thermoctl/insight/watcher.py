@@ -25,19 +25,20 @@ from thermoctl.insight.witness import Witness
 from thermoctl.signals import Event, Mode, PlantBelief, Quality, State, Step
 
 CHANGES = 10
-"""So many changes are remembered."""
+"""Number of changes that are remembered."""
 SETTLED_LAGS, SETTLED_S = 10.0, 60.0
-"""The plant is taken as known when the loop has been at rest for so long."""
+"""Time at rest after which the plant is taken as known: in lags and in s, the longer of the two."""
 CALM_S, CALM_LAGS = 600.0, 30.0
-"""After a move glass and corners follow for so long, and no line is laid through that."""
+"""Time after a move in which glass and corners still follow, and no line is fitted: in s and in
+lags, the longer of the two."""
 SURE = 0.15
-"""A gain whose standard deviation is a larger share of it is not known."""
+"""Relative standard deviation of a gain from which on it is not known."""
 ROWS_S = 5.0
 """Time from one set of rows to the next."""
 GAIN_MOVED = 1.1
-"""A gain that has moved by this factor makes the balance begin anew."""
+"""Factor by which a gain has to move for the balance to begin anew."""
 LAG_MOVED, LAG_HOLDS_S = 2.5, 3_600.0
-"""A lag that has moved by this factor, for so long, makes everything begin anew."""
+"""Factor by which a lag has to move, and time in s for which, for everything to begin anew."""
 
 
 class Insights:

@@ -1,4 +1,4 @@
-"""Somebody who knows the plant, whoever steers."""
+"""An estimate of the plant, whichever controller is in charge."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from thermoctl.signals import PlantBelief, Quality, Step
 
 
 class Witness:
-    """Asks the controllers what they believe, else a bank of its own.
+    """Takes the plant from the controllers, otherwise from a bank of its own.
 
-    That one is begun when a step comes of which no controller has words for its plant: with what
-    the last that had some would have kept for the next start, under the power of then.
+    That bank starts at the first step in which no controller estimates its plant. It starts from
+    what the last one that did would have kept for the next start, under the power of that moment.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 NEAR_K = 0.5
-"""The plant is being held while its temperature is this close to the set point."""
+"""Distance in K from the set point within which the plant is being held."""
 KNOWN_AFTER_S = 60.0
 MEMORY_S = 120.0
 

@@ -17,7 +17,7 @@ from thermoctl.signals import Measurement, Quality
 
 _STEPS = 24  # steps between readings that are remembered
 _STEP_FACTOR = 16.0  # five standard deviations of a step, were the noise normal
-_THRESHOLDS_MAX = 20.0  # noise moves the threshold up to so many times `Limits.jump_k`
+_THRESHOLDS_MAX = 20.0  # noise widens the threshold to this many `Limits.jump_k` at most
 
 
 class Verdict(StrEnum):

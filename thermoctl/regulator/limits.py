@@ -19,7 +19,8 @@ class Limits:
     Parameters
     ----------
     trip_above_c, trip_below_c : float
-        Everything off for good beyond these (one reading: power 0; the second: latched).
+        Limits in degC beyond which all is off until acknowledged: power 0 at the first reading,
+        latched at the second.
     setpoint_min_c, setpoint_max_c : float
         Range of set points that are accepted, inside the trips.
     period_s : float
@@ -67,21 +68,22 @@ class Limits:
 
     APPLIED_TOLERANCE = _APPLIED_TOLERANCE
     HOLD_S = 3.0
-    """HOLD keeps the last output no longer than this."""
+    """Longest time in s for which HOLD keeps the last output."""
     RIDE_S = 60.0
-    """RIDE lets the model steer no longer than this."""
+    """Longest time in s for which RIDE lets the model steer."""
     RIDE_ALARM_S = 5.0
     RETURN_S = 30.0
-    """Good readings for this long end SAFE."""
+    """Time in s of good readings that ends SAFE."""
     OPEN_COUNT = 3
     OPEN_WINDOW_S = 600.0
-    """So many open circuits within this time latch."""
+    """Time in s within which OPEN_COUNT open circuits latch."""
     STEEPEST_K_PER_S = 0.5
-    """No gain beyond this widens the jump: 1,500 W heat .7 l of water so fast."""
+    """Largest gain in K/s that widens the jump: 1,500 W in 0.7 l of water."""
     WIDEST_K = 10.0
-    """Nor does any, over however long a period, to more than this: half of a plain spike."""
+    """Largest jump in K, whatever gain and period: half of a plain spike."""
     OUTLIERS = 2
-    """So many outliers in a row are ignored; the next one that agrees with them is the truth."""
+    """Number of outliers in a row that are ignored; the next one that agrees with them is
+    believed."""
 
     def __post_init__(self) -> None:
         for each in fields(self):

@@ -10,7 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 _IN_A_ROW = 2
-"""One report beyond its command may be a slip of the line."""
+"""Number of reports in a row beyond the command that are a fault; a single one may be a slip of the
+line."""
 
 
 class Overdrawn(NamedTuple):

@@ -22,11 +22,11 @@ from thermoctl.regulator.limits import Limits
 from thermoctl.signals import Alarm, Measurement, Quality
 
 LAG_S = 30.0
-"""The lags of two healthy sensors differ by less than this."""
+"""Largest difference in s between the lags of two healthy sensors."""
 APART_S, APART_SAMPLES = 10.0, 3
-"""They have to disagree for this long, and in a slow loop for this many samples."""
+"""Time in s for which they have to disagree, and number of samples in a slow loop."""
 LOST_S = 5.0
-"""A sensor without readings is told of after this time, one that is open or shorted at once."""
+"""Time in s without a reading after which a sensor is reported; open or shorted, it is at once."""
 _NAMES = ("first", "second")
 _WORST_FIRST = (Quality.OPEN, Quality.SHORT, Quality.STALE)
 _FAULTS = {Quality.OPEN: 1, Quality.SHORT: 2}

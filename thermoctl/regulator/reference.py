@@ -16,8 +16,8 @@ from thermoctl.quantities import is_finite_number
 from thermoctl.signals import Mode, State
 
 FOLLOWED_K = 1.0
-"""A plant this near follows; the way to another set point then begins at the reference itself, and
-readings do not shake it."""
+"""Distance in K within which the plant follows the reference. The way to another set point then
+begins at the reference itself, and readings do not shake it."""
 _S_PER_MIN = 60.0
 
 

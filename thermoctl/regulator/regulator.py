@@ -231,7 +231,7 @@ class Regulator:
         return self._finish(measurement, situation, beliefs, load)
 
     def applied(self, power: float, kept_s: float = 0.0) -> None:
-        """Tell which power was taken, else the command's, and how slowly that falls."""
+        """Record the power accepted, NaN for unknown, and its decay time constant."""
         self._learning.kept_s = kept_s
         known = is_finite_number(power)
         taken = float(power) if known else math.nan
@@ -247,7 +247,7 @@ class Regulator:
         code : str
             Name of the alarm, such as ``output.refused``.
         fault : int or None
-            Row of the fault table.
+            Number of the fault.
         text : str
             What was expected and what came.
         """

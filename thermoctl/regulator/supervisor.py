@@ -7,7 +7,7 @@ state       power                                   left for
 ==========  ======================================  ==========================================
 RUN         what mode and controller ask, bounded   RIDE, HOLD, SAFE, LATCHED
 RIDE        from prediction, at most holding power  RUN at a good reading, SAFE when too long
-HOLD        the last one                            RUN at a good reading, SAFE when too long
+HOLD        the last one; 0 if a trip is pending    RUN at a good reading, SAFE when too long
 SAFE        0                                       RUN after 30 s of good readings
 LATCHED     0                                       SAFE when acknowledged and the cause gone
 ==========  ======================================  ==========================================

@@ -36,12 +36,12 @@ from thermoctl.control.adaptive.path import Path
 from thermoctl.quantities import Array, clamp, frozen, is_finite_number
 
 LOSS_FROM_S = 60.0
-"""The loss is limited by the gain from then on: before, the gain is hardly known."""
+"""Time in s from which on the gain limits the loss; before, the gain is hardly known."""
 BLIND_S = 300.0
-"""Without a reading for so long the filters stand still: what they would go on adding up says
-nothing of the water any more. Gain, loss and weights are kept, water and sensor begin anew."""
+"""Time in s without a reading after which the filters stand still. Gain, loss and weights are kept;
+water and sensor begin anew."""
 ONSET_SAMPLES = 10
-"""So many samples at least have to tell whether the plant was met at rest."""
+"""Least number of samples that tell whether the plant was met at rest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

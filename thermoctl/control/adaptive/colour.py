@@ -16,9 +16,9 @@ from thermoctl.control.adaptive.constants import Hearing
 from thermoctl.quantities import clamp
 
 START_K2 = 0.001
-"""Innovations are taken to vary by as much at first."""
+"""Variance of the innovations at the start, in K²."""
 LEAST_K2 = 1e-5
-"""An innovation is compared with no less than this."""
+"""Least variance that an innovation is compared with, in K²."""
 _MOST = 3.0  # standard deviations that one innovation counts as, at most
 _FIRST = 5.0  # samples that the start is worth
 

@@ -27,15 +27,16 @@ class Lags:
     Parameters
     ----------
     shortest_s : float
-        The shortest one. A quicker plant is taken to be as slow, and held more calmly than need be.
+        Shortest lag. A quicker plant is treated as one of this lag, and held more calmly than need
+        be.
     longest_s : float
-        The longest one, above the shortest. A slower plant overshoots.
+        Longest lag, above the shortest. A slower plant overshoots.
     count : int
-        How many there are. A wider range wants more of them.
+        Number of lags. A wider range wants more of them.
     pipe_beyond_s : float
-        In one of the shapes what a lag has beyond this time, of heater and sensor together, is dead
-        time: a pipe. 20 s are those of a vessel; with a share in its place, short lags had dead
-        time as well that no plant without a pipe has.
+        In one of the shapes, the part of a lag beyond this time of heater and sensor together is
+        dead time: a pipe. 20 s suit a vessel; a share in its place would give short lags a dead
+        time that no plant without a pipe has.
 
     Raises
     ------
@@ -77,29 +78,29 @@ class Plants:
     sensor_drift_k : float
         Noise of the sensor's temperature in a second.
     unrest : float
-        The noise of the loss grows by so much for every full range between power and holding power:
-        water on its way to another temperature, glass and air behind it, loses what it did not lose
-        before.
+        Growth of the noise of the loss per full range between power and holding power: water on its
+        way to another temperature, glass and air behind it, loses what it did not lose before.
     room_k : float
-        A loss grows as if the surroundings were so much colder. Were that left to the noise of the
-        loss, every set point would have one to be learnt anew. Most are nearer, and it grows
-        faster.
+        A loss grows with the temperature as if the surroundings were this much colder. If that were
+        left to the noise of the loss, it would have to be learnt anew at every set point. Most
+        surroundings are nearer, and the loss grows faster.
     loosened_lags, loosened_share : float
-        After so many lags the heat has arrived, and the gain is known well enough to say how large
-        a loss may be: gain and loss become uncertain by this share.
+        After this many lags the heat has arrived, and the gain is known well enough to limit the
+        loss: gain and loss then become uncertain by this share.
     reopened_share : float
-        A loss that has changed has done so by something like this share.
+        Uncertainty of a loss that has changed, as a share.
     rescaled_share : float
-        Or loss and gain have both changed, by a factor with this deviation: there is less water.
+        Or loss and gain have both changed, by a factor with this standard deviation: there is less
+        water.
     known_share : float
         A gain is known once its standard deviation is at most this share of it.
     gain_min_k_per_s : float
-        The least that a heater can do: 17 W in 200 l of water.
+        Least gain of a heater: 17 W in 200 l of water.
     heat_max_k : float
-        The most that full power has under way: a gain is at most this over the lag. A plant that is
-        quicker is held as if it were no quicker. One limit for the gains of all lags would have to
-        be so low that no quick plant is believed in, or else a long lag with a gain that no plant
-        of that lag has explains a warm-up as well as the truth does.
+        Most heat that full power has under way: a gain is at most this over the lag. A quicker
+        plant is held as if it were no quicker. A single limit for the gains of all lags would
+        either admit no quick plant, or let a long lag with an impossible gain explain a warm-up as
+        well as the truth does.
 
     Raises
     ------
@@ -132,43 +133,47 @@ class Hearing:
     Parameters
     ----------
     dead_zone : float
-        Power this close to its mean proves nothing. In quiet regulation ln S alone would speak,
-        always for a small gain, and a small vessel drift to a wrong hypothesis.
+        Distance of the power from its mean within which a sample proves nothing. In quiet
+        regulation ln S alone would count, always in favour of a small gain, and a small vessel
+        would drift to a wrong hypothesis.
     memory_s, memory_lags : float
-        The mean is that of so long a time, and of so many lags where that is longer. What a move of
-        the power proves is seen when its heat arrives: had the mean followed by then, nobody would
-        listen. The first guess of a slow plant, slower yet, then steers so calmly that it is never
-        put right.
+        Time constant of that mean: in s and in lags, the longer of the two. A move of the power
+        proves something when its heat arrives; if the mean had followed by then, it would not
+        count. A slow plant, first taken for a still slower one, would then be steered so calmly
+        that the guess is never corrected.
     gate_sds : float
-        An innovation beyond so many standard deviations is outside: nobody's, unless it lasts.
+        Standard deviations beyond which an innovation is outside and ignored, unless it lasts.
     hold_lags : float
-        No evidence about lags for so many of them after a jump, or it would be read as a change of
-        lag. What it says of shapes is heard: how fast the reading follows is the sensor alone.
+        Number of lags after a jump in which nothing is evidence about lags, or it would be read as
+        a change of lag. Evidence about shapes counts: how fast the reading follows is the sensor
+        alone.
     quiet_lags, quiet_power : float
-        After so many lags of steady power nothing is under way any more, if the power is this close
-        to what holds the water: a warm-up is steady too, and no rest.
+        After this many lags of steady power nothing is under way any more, if the power is this
+        close to the holding power: a warm-up is steady too, and no rest.
     suspected_sds, drifted_sds : float
-        Sums of innovations beyond the first: power that moves is no evidence. Beyond the second:
-        the loss has changed. White ones are beyond 3 for 6 % of the time, and reach 14 three times
-        in ten million samples: about once in 40 days without a move of the power.
+        Limits for sums of innovations. Beyond the first, a power that moves is no evidence; beyond
+        the second, the loss has changed. Sums of white ones are beyond 3 for 6 % of the time, and
+        reach 14 three times in ten million samples: about once in 40 days without a move of the
+        power.
     noise_most_k : float
-        What misses by more is no noise, and what moves by more is no step of the readings: it is
-        the plant, unlike what is believed of it. Eight bits of 100 K are .39 K.
+        An innovation beyond this is no noise, and a move beyond it no step of the readings: it is
+        the plant, unlike what is believed of it. Eight bits of 100 K are 0.39 K.
     white : float
-        Noise is white as long as an innovation goes over into the next one by no more than this
-        share. With .3 a plant that is unlike any hypothesis, such as a lab of 4 g, is taken for a
-        hum, and with .5 a hum is taken for a plant.
+        Largest correlation of an innovation with the next one for which the noise counts as white.
+        With 0.3 a plant that is unlike any hypothesis, such as a lab of 4 g, is taken for a hum,
+        and with 0.5 a hum is taken for a plant.
     colour_times : float
-        The rest counts so many times as noise: innovations are what the filters have left of it.
+        Factor with which the correlated rest counts as noise: innovations are what the filters have
+        left of it.
     colour_samples : float
-        For so many samples it is kept. A sensor hums for as long as it is there; with 200, ice that
-        melts was taken for it, and found three times as late.
+        Memory of that rest, in samples. A sensor hums for as long as it is there; with 200, ice
+        that melts was taken for a hum, and found three times as late.
     onset_s : float
-        So long it is open whether power was full before the first reading, or none.
+        Time in which it is open whether power was full before the first reading, or none.
     onset_odds : float
-        It was full beyond these log odds, 2.7 to 1: most plants are met at rest.
+        Log odds beyond which it was full, 2.7 to 1: most plants are met at rest.
     onset_most : float
-        More than this no reading adds to the odds: of the noise little is known yet.
+        Most that one reading adds to these log odds: little is known of the noise yet.
 
     Raises
     ------
@@ -209,34 +214,35 @@ class Pace:
     Parameters
     ----------
     fastest_s, fastest_periods : float
-        Tc is no shorter, whatever the lag, nor shorter than so many samples: at one sample any
-        error of the gain would be given back whole, and below it the loop would be unstable.
+        Least Tc, in s and in samples, whatever the lag: at one sample any error of the gain would
+        be given back whole, and below it the loop would be unstable.
     lag_floor_s, lag_floor_share : float
-        No lag is known better than to the first and this share of it together, whatever the weights
-        say: no plant is quite like any hypothesis.
+        Least uncertainty of the lag: this time and this share of it together, whatever the weights
+        say, since no plant is quite like any hypothesis.
     mistaken_k, calmer : float
         What full power heats in the time by which the lag may be mistaken comes as overshoot. Where
-        that is more than so many kelvin Tc grows by as much, and no more than so many times.
+        that exceeds `mistaken_k`, Tc grows in proportion, by the factor `calmer` at most.
     smoothness : float
-        The lag of the power itself, as a share of Tc. Noise costs a good deal less travel than at
-        once, while a power that has far to go is at its limit at once all the same.
+        Lag of the power itself, as a share of Tc. Noise then moves the heater a good deal less,
+        while a power that has far to go is at its limit at once all the same.
     left_out, even, heavy_k : float
-        On the move so much of the heat in the heater is left out of account. Were all of it
+        Share of the heat in the heater that is left out of account on the move. If all of it
         counted, the error would go by Tc and the water follow as slowly as the heater; so both go
-        at one pace, damped by some .85. A lag that is mistaken then costs more: where the range of
+        at one pace, damped by some 0.85. A lag that is mistaken then costs more: where the range of
         power has `even` times `heavy_k` under way within a lag all of that heat counts, and beyond
         it even more.
     resting, rest_power : float
-        Within so small a surplus of power that heat counts so many times. At rest it is the answer
-        to noise that has passed, and what is taken back of it need not be cooled away.
+        Factor with which that heat counts where the power is within `rest_power` of the holding
+        power. At rest it is the answer to noise that has passed, and what is taken back of it need
+        not be cooled away.
     vague_share, vague_k_per_s : float
-        A gain is taken to be larger by what its deviation, no more of it than the second, exceeds
-        this share of it. Else a start in water that is nearly warm would ask for all the power
-        there is.
+        A gain is taken to be larger by what its standard deviation, `vague_k_per_s` of it at most,
+        exceeds `vague_share` of it. Otherwise a start in water that is nearly warm would ask for
+        all the power there is.
     caution, agreed_k : float
-        An error is acted on but for so many standard deviations among the hypotheses beyond the
-        latter. What they disagree in is heat on its way. When it has arrived they agree: nothing
-        waits for ever.
+        The error that is acted on is less by `caution` standard deviations among the hypotheses
+        beyond `agreed_k`. What they disagree in is heat on its way. When it has arrived they agree:
+        nothing waits for ever.
 
     Raises
     ------

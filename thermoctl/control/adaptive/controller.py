@@ -32,15 +32,15 @@ from thermoctl.signals import Beliefs, PlantBelief
 
 RIDE_LAGS = 3.0
 UNKNOWN_S, UNKNOWN_PERIODS = 60.0, 10.0
-"""After a longer gap nobody knows what was applied: commands expire."""
+"""Gap in s, and in periods, beyond both of which nobody knows what was applied: commands expire."""
 
 DOUBTFUL_LEAST, DOUBTFUL_MOST = 2.0, 0.9
-"""With less than so many times the least gain it rests on its bound: 200 l at 33 W, or no heater.
-With more than this share of the most under way it rests on the other one, and power is too strong
-an answer to any error."""
+"""The estimated gain counts as pinned to its lower bound below DOUBTFUL_LEAST times the least gain
+(200 l at 33 W, or no heater), and to its upper bound above DOUBTFUL_MOST times the most heat under
+way over the lag: power is then too strong an answer to any error."""
 
 SDS_EVERY = 5
-"""Standard deviations change slowly: they are reckoned anew after so many samples."""
+"""Number of samples after which standard deviations are computed anew; they change slowly."""
 
 
 class Sds(NamedTuple):
@@ -96,7 +96,7 @@ class Adaptive:
     Parameters
     ----------
     calmness : float
-        kappa, from .1 to 10: .2 is brisk, .8 calm. The one thing to choose.
+        kappa, from 0.1 to 10: 0.2 is brisk, 0.8 calm. The one thing to choose.
     period_s : float
         Time between two samples, as the loop has it. Longer and shorter intervals are met by as
         many predictions as periods went by.
@@ -104,7 +104,7 @@ class Adaptive:
         What power does to the plant; heat-cool: a positive one heats and a negative one cools.
     cooling_ratio : float
         For heat-cool: what the cooler takes out at full power over what the heater brings in, from
-        .02 to 10. Where it is not known, rather too low than too high.
+        0.02 to 10. Where it is not known, rather too low than too high.
     lags, plants, hearing, pace : Lags, Plants, Hearing, Pace
         The constants of the law. No plant met so far wanted others.
 

@@ -17,13 +17,13 @@ from thermoctl.quantities import Array, clamp, frozen
 
 USUAL = Hearing()
 GATE_SAMPLES = 20
-"""So many valid samples come before the gate closes: they show what is likely."""
+"""Number of valid samples before the gate closes: they show what is likely."""
 
 # -- noise ----------------------------------------------------------------------------------------
 
 NOISE_START_K2 = 0.001
 NOISE_MIN_K2 = 1e-5
-"""A noise below 3 mK is not believed: the model is not that good."""
+"""Least variance of the noise in K², 3 mK: the model is no better than that."""
 _SPREAD = 6.0  # variance of y - 2 y1 + y2 in units of the noise's: 1 + 4 + 1
 _MOST = 9.0  # a second difference counts as three standard deviations at most
 _MEMORY = 0.005  # of 200 samples
@@ -141,7 +141,8 @@ class Excitation(NamedTuple):
 # -- outliers and jumps ---------------------------------------------------------------------------
 
 OUTLIERS = 2
-"""So many samples outside in a row are nobody's; one more, and the water has jumped."""
+"""Number of samples in a row outside the gate that are ignored; one more, and the water has
+jumped."""
 
 
 class Gate(NamedTuple):
@@ -173,9 +174,10 @@ class Gate(NamedTuple):
 # -- drifts ---------------------------------------------------------------------------------------
 
 QUIET_SAMPLES = 20
-"""At rest means so many samples at least."""
+"""Least number of samples of a rest."""
 DRIFTS = 0.5
-"""The sums are made to find innovations that are off by twice this, in standard deviations."""
+"""Allowance of the two sums, in standard deviations; they find innovations that are off by twice
+this."""
 
 
 class Drifting(NamedTuple):
@@ -237,11 +239,11 @@ class Drifting(NamedTuple):
 # -- weights --------------------------------------------------------------------------------------
 
 SURPRISE_MAX = 9.0
-"""One sample costs a hypothesis no more than three standard deviations."""
+"""Most that one sample costs a hypothesis: the square of three standard deviations."""
 FLOOR = -30.0
-"""No log weight falls lower, so that a hypothesis can return within tens of seconds."""
+"""Least log weight, so that a hypothesis can return within tens of seconds."""
 EVIDENCE_FROM = 4
-"""Samples at the start that are no evidence: the filters have not met the sensor yet."""
+"""Number of samples at the start that are no evidence: the filters have not met the sensor yet."""
 
 
 class Weights(NamedTuple):

@@ -38,14 +38,14 @@ START_CORRELATION = 0.98
 """Of T and z: a sensor shows the water it lies in."""
 
 GAIN_LEAST = 1e-4
-"""Noises are shares of no smaller gain than this, in K/s."""
+"""Least gain in K/s of which noises are shares."""
 
 LOSS_MIN, LOSS_MAX = 0.5, 0.95
-"""The loss keeps this far below the least and within this share of full power, in gains."""
+"""Bounds of the loss, in gains: LOSS_MIN below the least power, and LOSS_MAX of full power."""
 
 
 CAUGHT_UP = 0.03
-"""By no more than this share a sample of rest is taken to change what is known of the loss."""
+"""Largest share by which a sample at rest is taken to change the variance of the loss."""
 
 
 class Prior(NamedTuple):

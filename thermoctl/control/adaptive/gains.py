@@ -18,13 +18,13 @@ from thermoctl.control.adaptive.filters import Block, D, PerPeriod
 from thermoctl.quantities import Array, frozen
 
 GOOD_SAMPLES = 14
-"""For so many samples after the one that reckoned them gains are good, once they have settled."""
+"""Number of samples for which settled gains are kept after the one that computed them."""
 SETTLED = 0.05
-"""They have settled when what binds the loss to the reading, K S, has changed by no more than this
-share since they were reckoned before: it is the slowest, and R, which wanders, does not count."""
+"""Largest relative change of K S, which binds the loss to the reading, since gains were computed
+before, for which they have settled. It is the slowest part; R wanders, and does not count."""
 KNOWN = 0.9
-"""And when so much of the weight is on hypotheses that know the gain of the plant: where it is not
-known, rest is still telling of it, and binding it to the loss."""
+"""Least weight of the hypotheses that know the gain of the plant, for gains to have settled. Where
+it is not known, rest is still telling of it, and binding it to the loss."""
 
 
 class Gains(NamedTuple):

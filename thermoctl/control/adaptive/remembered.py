@@ -31,19 +31,20 @@ from thermoctl.quantities import Array, is_finite_number
 from thermoctl.ranges import number
 
 KNOWN_SHARE = 0.25
-"""A gain is known, and worth keeping, once its deviation is at most this share of it."""
+"""Largest standard deviation of a gain that is worth keeping, as a share of it."""
 
 GAIN_SHARE = 0.2
-"""A gain comes back with at least this share of it as its deviation: water is added and taken."""
+"""Least standard deviation of a recalled gain, as a share of it: water is added and taken."""
 LOSS_SHARE = 0.05
-"""And a loss with this share of the gain: it depends on temperature and surroundings. With twice as
-much, the loss takes the blame for a gain that is too high."""
+"""Least standard deviation of a recalled loss, as a share of the gain: it depends on temperature
+and surroundings. With twice as much, the loss takes the blame for a gain that is too high."""
 DOUBLED_S = 14 * 86400.0
-"""After such a time the variance of the gain is twice as large; it grows with time from there."""
+"""Age in s at which the variance of the gain is twice as large; it grows in proportion to the
+age."""
 WEIGHT_POWER = 0.5
-"""Weights come back raised to this power, and so half as telling,"""
+"""Power to which recalled weights are raised: half as telling."""
 WEIGHT_FLOOR = -5.0
-"""and no log weight lower than this: a few samples bring every hypothesis back."""
+"""Least log weight that is recalled: a few samples bring every hypothesis back."""
 
 NOISE_MAX_K2 = 100.0
 _DIGITS = 5

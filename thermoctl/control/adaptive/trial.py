@@ -19,12 +19,12 @@ from thermoctl.control.adaptive.bank_belief import BankBelief
 from thermoctl.control.adaptive.evidence import EVIDENCE_FROM
 
 DROP_ODDS = -3.0
-"""Log odds at which the remembered bank goes: 20 to 1 against it."""
+"""Log odds below which the remembered bank is dropped: 20 to 1 against it."""
 HEARD_S, HEARD_LAGS = 60.0, 3.0
-"""The trial is over after so much of exciting time, and so many lags of it."""
+"""Exciting time after which the trial is over: in s and in lags, the longer of the two."""
 
 _EVEN_ODDS, _SAID_ODDS = math.log(1.5), math.log(1000.0)
-"""Below the first, odds are said to be even; beyond the other, how long they are says no more."""
+"""Log odds below which they are called even, and above which 'more than' is all that is said."""
 
 TRUSTED, DROPPED = "model.trusted", "model.dropped"
 

@@ -24,8 +24,8 @@ import numpy as np
 from thermoctl.quantities import Array
 
 STRETCHES = 3
-"""How many horizons are added to the first. With none, a tank whose element and sensor lag by 40 s
-each is overshot by .2 K; five move the power farther and gain little more."""
+"""Number of horizons added to the first. With none, a tank whose element and sensor lag by 40 s
+each is overshot by 0.2 K; five move the power farther and gain little more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -27,14 +27,14 @@ from thermoctl.signals import Beliefs
 
 MOVES_MAX = 6
 BLOCKS_MAX, SAMPLES_MAX = 200, 1000
-"""Most blocks in a horizon and most samples in a block: a tick has to end."""
+"""Largest number of blocks in a horizon, and of samples in a block: a cycle has to end."""
 RIDE_LAGS = 3.0
 BLIND_S = 300.0
-"""After so long without a reading the record begins anew; what was learnt is kept."""
+"""Time in s without a reading after which the record begins anew; what was learnt is kept."""
 UNKNOWN_S, UNKNOWN_PERIODS = 60.0, 10.0
-"""After a longer gap nobody knows what was applied: commands expire."""
+"""Gap in s, and in periods, beyond both of which nobody knows what was applied: commands expire."""
 TRUST_S = 900.0
-"""Time over which the power that is given in doubt is a mean."""
+"""Time constant in s of the mean power that is given in doubt."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,14 +13,14 @@ import math
 from dataclasses import dataclass, replace
 
 NEARLY_FULL = 0.9
-"""A power from this share of the most on is meant to warm."""
+"""Share of the most power from which on it is meant to warm."""
 UNSEEN_BLOCKS, JUDGED_BLOCKS = 8, 8
-"""Blocks of it that the lag may hide, and the least that are judged."""
+"""Number of blocks of such power that the lag may hide, and least number that are judged."""
 FALLEN_K, RISEN_K = 0.05, 0.2
-"""What falling means, and what ends the doubt."""
+"""Fall in K that is a doubt, and rise in K from the lowest reading that ends it."""
 PAUSE_BLOCKS, TRIAL_BLOCKS = 180, 16
-"""Blocks in doubt until full power is tried again, and for how long: a heater that somebody has
-mended would not be noticed otherwise."""
+"""Number of blocks in doubt until full power is tried again, and of that trial: otherwise nobody
+would notice that a heater was mended."""
 
 
 @dataclass(frozen=True, slots=True)

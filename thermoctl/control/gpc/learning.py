@@ -26,35 +26,39 @@ from thermoctl.quantities import Array, clamp, frozen
 POLE_START = 0.3
 """First guess of one pole beside the one at 1; a third would begin at 0."""
 POLE_SD, GAIN_SD, LOSS_SD = 0.5, 3.0, 0.1
-"""Of the start: of each a; of b's and loss in shares of the first guess of the gain."""
+"""Standard deviations at the start: of each a; of the b's and the loss as shares of the first
+gain."""
 POLE_DRIFT, GAIN_DRIFT, LOSS_DRIFT = 3e-3, 3e-3, 6e-4
-"""Noise in a second: of each a; of b's and loss in shares of the gain."""
+"""Drift in a second: of each a; of the b's and the loss as shares of the gain."""
 POLE_MAX_S = 140.0
-"""The slowest pole beside the one at 1; slower, the two could not be told apart."""
+"""Largest time constant in s of the pole beside the one at 1; slower, the two could not be told
+apart."""
 GAIN_SHARE_MIN = 5e-4
-"""The gain is at least this share of the first guess: 200 l at 50 W, where 8 at 1,500 were guessed.
-A larger one would make such a vessel wait for hours; what matters is that it is above 0."""
+"""Least gain, as a share of the first guess: 200 l at 50 W, where 8 at 1,500 were guessed. With a
+larger one such a vessel would wait for hours; what matters is that it is above 0."""
 LOSS_MIN, LOSS_MAX = -0.1, 0.95
-"""The loss in shares of the gain: no vessel warms by itself for long, and power can hold it."""
+"""Bounds of the loss, as shares of the gain: no vessel warms by itself for long, and power can hold
+it."""
 
 EXCITED_FROM, EXCITED_SPAN = 0.05, 0.05
-"""Powers this far from their running mean teach something, and by so much more everything."""
+"""Distance of a power from its running mean beyond which it teaches something, and by how much more
+it teaches everything."""
 EXCITATION_BLOCKS = 20.0
-"""Blocks over which that mean is taken."""
+"""Time constant of that mean, in blocks."""
 
 NOISE_START_K, NOISE_MIN_K = 0.01, 0.003
-"""Standard deviation of an innovation: the first guess, and the least that is believed."""
+"""Standard deviation of an innovation in K: the first guess, and the least."""
 NOISE_SAMPLES = 200.0
 NOISE_CLIP = 9.0
-"""An innovation counts as no more than three deviations, or a jump would deafen the filter."""
+"""Most that a squared innovation counts, in variances: a jump would deafen the filter."""
 
 GATE = 25.0
-"""Beyond five deviations the water was moved by something else than power."""
+"""Squared innovation, in variances, beyond which something else than power moved the water."""
 GATE_BLOCKS = 6
-"""From so many blocks on: before, it is the model that is wrong."""
+"""Number of blocks before the gate closes: until then it is the model that is wrong."""
 SILENT_MORE, LISTENS_MORE = 2, 3
-"""Blocks beyond the memory of the model in which a jump is not learnt from, and how many times as
-long everything is listened to after the jump: a plant that has changed has to be learnt anew."""
+"""Blocks beyond the memory of the model in which a jump is not learnt from, and multiples of that
+time after it in which everything is learnt from: a changed plant has to be learnt anew."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

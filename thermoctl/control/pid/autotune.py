@@ -12,7 +12,8 @@ from thermoctl.control.pid.simc import Gains
 from thermoctl.ports import Situation
 
 FORGOTTEN_S, FORGOTTEN_PERIODS = 30.0, 5.0
-"""A test that somebody else steered through for longer than both is forgotten."""
+"""Time in s and in periods, the longer of the two, of somebody else steering after which a test is
+forgotten."""
 
 
 @dataclass(frozen=True, slots=True)

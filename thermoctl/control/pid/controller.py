@@ -83,7 +83,7 @@ class Pid:
     tuning_limit_s : float
         How long a test may take; the gains stay as given when it has not ended by then.
     relay_amplitude : float
-        How far the relay goes from its middle, .02 to .5 of full power. Its highest power has to
+        How far the relay goes from its middle, 0.02 to 0.5 of full power. Its highest power has to
         be well above the one that holds the set point, and begins at twice this.
     period_s : float
         Time between two samples, as the loop has it.
@@ -92,7 +92,7 @@ class Pid:
         the same gains in units of heat, and tests are made with the heater.
     cooling_ratio : float
         For heat-cool: what the cooler takes out at full power over what the heater brings in, from
-        .02 to 10. Its gains below 0 are those of the heater over this.
+        0.02 to 10. Its gains below 0 are those of the heater over this.
 
     Raises
     ------

@@ -34,15 +34,16 @@ HYSTERESIS_SD, HYSTERESIS_MIN_K = 4.0, 0.01
 A wide band makes the swing slower than the plant's own, and its limit a matter of extrapolation.
 """
 BAND_K = 5.0
-"""Once at the set point, a test that is further from it than this is given up."""
+"""Largest distance in K from the set point, once there; a test that is farther away is given up."""
 JUDGED = 2
-"""Cycles that are judged."""
+"""Number of cycles that are judged."""
 ALIKE = 0.1
-"""They are when their lengths differ by at most this share."""
+"""Largest difference between their lengths, as a share, for which they count."""
 _HALVINGS = 50
 _LAG_SHARE = 0.5
 SWING_SHARE = 0.25
-"""The power has to swing by this share of what the relay asks for, or it was not the relay's."""
+"""Least swing of the power, as a share of what the relay asks for; a smaller one is not the
+relay's."""
 
 
 def harmonic_point(

@@ -13,7 +13,7 @@ from thermoctl.control.pid.simc import Gains
 from thermoctl.ranges import number
 
 SLOPE_MIN, SLOPE_MAX = 2e-5, 0.5
-"""What a heater can do to water, in K/s: 17 W in 200 l, 1,500 W in .7 l."""
+"""Bounds in K/s of what a heater does to water: 17 W in 200 l, 1,500 W in 0.7 l."""
 BRISKEST = 2.0
 """No rule gives more than this share of full power for what full power heats in a period: half of
 one is dead time, and a derivative at most doubles the gain."""

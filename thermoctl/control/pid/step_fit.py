@@ -26,7 +26,7 @@ _SHARES = (0.25, 0.4, 0.55, 0.7, 0.85)
 _SHORTEST_S = 1.0
 _READINGS_MIN = 8
 LOSS_MAX = 0.5
-"""The plant is taken to lose at most this share of full power."""
+"""Largest loss of a plant, as a share of full power."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,16 +15,17 @@ from thermoctl.control.pid.stretch import Piece, Stretch
 from thermoctl.ports import Situation
 
 BEGIN_BELOW_K = 3.0
-"""A warm-up shorter than this is none to learn from."""
+"""Least warm-up in K that there is to learn from."""
 SHARE = 0.5
-"""The power is on for at most this share of the way to the set point."""
+"""Largest share of the way to the set point for which the power is on."""
 RISE_MIN_K = 1.0
 LAGS_RISING, LAGS_COASTING = 6.0, 4.0
-"""So many lags have to be in sight, while power is on and after."""
+"""Number of lags that have to be in sight, while power is on and after."""
 FIRST_LOOK_PERIODS = 10.0
 NEXT_LOOK = 1.2
 COAST_S, COAST_SHARE = 120.0, 2.0
-"""Without power a test lasts at most so long, and so many times as long as with it."""
+"""Longest time without power in a test: COAST_S seconds, and COAST_SHARE times the time with it
+besides."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from thermoctl.control.pid.simc import Gains
 
 TOLERANCE = 0.01
-"""A converter rounds: only a power further from the one asked for was limited by somebody."""
+"""Largest difference from the power asked for that is a converter's rounding; beyond it somebody
+limited it."""
 
 
 @dataclass(frozen=True, slots=True)

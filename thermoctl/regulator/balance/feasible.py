@@ -24,34 +24,37 @@ from thermoctl.signals import Alarm, Feasible, Mode
 
 STRETCH_S = 10.0
 LAG_GUESS_S = 30.0
-"""Lag of a plant of which the controller says nothing."""
+"""Lag in s that is assumed while the controller knows none."""
 ARRIVED_K = 0.1
-"""So near the set point counts as there."""
+"""Distance in K from the set point within which it counts as reached."""
 SURE_SDS, OVER_SDS = 3.0, 1.0
-"""It is unreachable beyond the first, and no longer below the second."""
+"""An alarm comes when its condition holds by more than SURE_SDS standard deviations, and goes when
+it holds by less than OVER_SDS."""
 SD_MOST_K = 50.0
 POWER_SD_MOST = 0.3
-"""What is known to no better than these is not told."""
+"""A limit known to no better than SD_MOST_K, and a holding power known to no better than
+POWER_SD_MOST of full power, are not reported."""
 REST_SHARE = 0.8
-"""The last heat comes with the slowest part of the lag."""
+"""Time constant of the last heat, as a share of the lag: that of its slowest part."""
 LAG_DOUBT = 0.4
-"""Standard deviation of the time the last heat takes, as a share of it."""
+"""Standard deviation of the time that the last heat takes, as a share of it and of the lag."""
 UNSEEN_S = 60.0
-"""What was foreseen for longer without a reading is told to nobody, and no ground for an alarm."""
+"""Time in s without a reading after which no forecast is reported, and no alarm comes or goes."""
 FULL = 0.95
-"""Share of the most power that counts as all of it."""
+"""Share of the most power from which on it counts as full."""
 STEADY = 12
-"""So many stretches in a row must say the same before the alarm comes or goes."""
+"""Number of stretches in a row that must agree before an alarm comes or goes."""
 
 UNREACHABLE = "setpoint.unreachable"
 DRIVEN = "plant.driven"
 FAILED = "balance.failed"
 _PRIORITY = 2
 NONE = 0.02
-"""Power below this is none. It is none as well where no more was commanded and an output gives what
-it cannot keep back: what it says it gives heats the plant no less for being known."""
+"""Commanded power up to which the plant counts as unpowered. Heat that an output gives beyond its
+command, because it cannot keep it back, drives the plant all the same."""
 BEYOND_K = 0.5
-"""What is no farther beyond the set point is regulation."""
+"""Distance in K beyond the set point from which on a plant is driven, and distance of a set point
+beyond the ceiling from which on it is out of reach. Less is regulation."""
 
 
 class Gathered(NamedTuple):

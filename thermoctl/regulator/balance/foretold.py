@@ -12,13 +12,15 @@ import math
 from thermoctl.regulator.balance.heat_belief import Known
 
 SLIPS_S, SETTLES_S, NEARS_S = 600.0, 600.0, 1800.0
-"""Memory of how late an arrival was, of the power that was told to hold, and of what was told to be
-the farthest that can be held."""
+"""Time constants in s with which past values are forgotten: of how late an arrival was, of the
+holding power, and of the farthest temperature that can be held."""
 MOVED_SDS, STAYS_SDS, SURELY_SDS = 1.5, 0.5, 3.0
-"""The farthest moves once it has done so by the first, and stands again below the second; it
-surely lies beyond the third."""
+"""The farthest temperature that can be held counts as moving when it has moved by MOVED_SDS
+standard deviations, until it has moved by less than STAYS_SDS. SURELY_SDS of them are subtracted
+for what can surely be held."""
 WITHIN_S = 86_400.0
-"""Goods take no longer than a day."""
+"""Time in s in which it has to come to the set point at that pace: goods take no longer than a
+day."""
 
 
 class Slip:

@@ -13,11 +13,11 @@ Row = tuple[float, ...]
 """A number for each of the five."""
 
 SIGN_SDS = 1.5
-"""So many standard deviations from 0 the direction of the gain is taken for known."""
+"""Standard deviations from 0 beyond which the direction of the gain is known."""
 WARMS_AT_MOST_K = 500.0
-"""Full power takes no plant farther above its rest; this bounds the slope from below."""
+"""Largest rise in K above rest that full power holds; it bounds the slope from below."""
 R_FIRST = 4e-4
-"""Variance of a stretch's mean reading in K², before there was one."""
+"""Variance in K² of the mean reading of a stretch, before there was one."""
 
 
 class Known(NamedTuple):

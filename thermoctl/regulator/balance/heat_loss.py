@@ -39,38 +39,40 @@ from thermoctl.regulator.balance.heat_belief import (
 )
 
 START_SD = (0.1, 0.15, 0.01, 1e-3, 1e-3)
-"""Of T in K, beta and d in K/s, k and g in 1/s: wide, but for a plant that begins near its rest."""
+"""Standard deviations at the start: of T in K, beta and d in K/s, k and g in 1/s. They are wide,
+but for a plant that begins near its rest."""
 SCALED = 0.2
-"""Once the rate at full power is known to this share, it is the scale of what follows:"""
+"""Relative standard deviation of the rate at full power below which that rate is the scale of what
+follows:"""
 LOSS_SHARE, WARMS_K, SOAKS_K = 0.3, 30.0, 80.0
 """loss at the start, how far full power warms the plant, and how much colder a wall takes all of it
 (one standard deviation: less loss, farther, colder)."""
 SOAKS_S = 400.0
-"""A wall follows within about so many seconds: 6 l of it beside 60 W/K."""
+"""Time constant in s of a wall: 6 l of it beside 60 W/K."""
 WALL_SHARE = 0.35
-"""None follows in just that time; so of the slope that was learnt this share is doubted, as far as
-the plant is still ahead of its walls."""
+"""Share of the learnt slope that is doubted as far as the plant is ahead of its walls, since none
+follows in just that time."""
 WANDER = 0.25
-"""Noise of T in a second, as a share of the gain: mains of 1 % (2 % of power) for a minute."""
+"""Noise of T in a second, as a share of the gain: mains off by 1 % (2 % of power) for a minute."""
 DRIFT_BETA, DRIFT_D, DRIFT_K = 2e-4, 3e-4, 5e-4
-"""Noise of gain and loss in a second, as shares of the gain; of k, as a share of k."""
+"""Noise in a second: of gain and loss as shares of the gain, of k as a share of k."""
 VAGUE = 0.3
-"""A gain or slope that is known to no better than this share drifts no further."""
+"""Relative standard deviation above which a gain or slope drifts no further."""
 BEND, BEND_SD = 0.01, 0.015
-"""Change of the slope in a kelvin, as a share of it, and how uncertain that is."""
+"""Change of the slope per kelvin, as a share of it, and its standard deviation."""
 
 NEARLY_K = 0.1
-"""Water, and what a sensor shows of it, differ by about so much."""
+"""Usual difference in K between the water and what a sensor shows of it."""
 
 R_MIN = 1e-6
-"""Variance of a stretch's mean reading is no less, in K²."""
+"""Least variance in K² of the mean reading of a stretch."""
 LAG_SHARE = 2.0
-"""Share of that which may come earlier or later than a lag of first order has it."""
+"""Share of the late heat that may come earlier or later than a lag of first order has it."""
 GATE = 9.0
 GATE_STRETCHES = 6
 CHANGED_AFTER, FORGIVEN = 3, 0.25
-"""So many jumps are another plant, and not a litre of cold water; a stretch without any makes up
-for this much of one."""
+"""Number of jumps that mean another plant, and not a litre of cold water; every stretch without one
+takes FORGIVEN off the count."""
 
 
 class Stretch(NamedTuple):

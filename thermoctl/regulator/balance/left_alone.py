@@ -23,19 +23,20 @@ from thermoctl.regulator.heater.known import OFF_LAGS
 from thermoctl.regulator.heater.response import LAGS_S
 
 WAITS_S = OFF_LAGS * LAGS_S[-1]
-"""Heat is under way for no longer, whatever the lag."""
+"""Time in s without power after which no heat is under way, whatever the lag."""
 LOSES = 0.1
-"""So much of a loss that was believed is left at least: what goes into a cold wall looks like five
-times what is lost, and in the end the wall is warm."""
+"""Least share of the believed loss that must remain: in a warm-up a cold wall may take five times
+what is lost, and in the end it is warm."""
 LEFT_K, LEFT_SDS = 0.5, 5.0
-"""What is missing adds up to a doubt beyond these, in K and in standard deviations of a reading."""
+"""The missing fall is a doubt beyond both, in K and in standard deviations of a reading."""
 MOST = 2.0
-"""It adds up to no more than so many times that: when the plant comes back, it is soon over."""
+"""Most that is added up, in such limits, so that the doubt is soon over when the plant comes
+back."""
 
 PATIENCE_S = 864_000.0
-"""What is not reached in ten days at the present rate counts as never reached."""
+"""Time in s, ten days: what is not reached in it at the present rate is never reached."""
 MEAN_S = 1800.0
-"""Mean readings over so long are compared: draughts and showers are shorter."""
+"""Length in s of the means that are compared: draughts and showers are shorter."""
 
 
 class Beyond(NamedTuple):

@@ -9,7 +9,7 @@ from thermoctl.regulator.heater.response import Block
 BLOCK_S = 4.0
 NOISE_START_K2 = 1e-3
 NOISE_MIN_K2 = 1e-6
-"""Noise below 1 mK is not believed."""
+"""Least variance of the noise in K²: 1 mK."""
 _MOST = 9.0  # a square counts as three standard deviations at most
 _MEMORY = 0.01  # of 100 readings
 _SPREAD = 6.0  # variance of y - 2 y1 + y2 in units of the noise's: 1 + 4 + 1
@@ -82,9 +82,11 @@ class Repeats:
     KNOWN_AFTER = 200
     MEMORY = 1 / 500
     TURNS_MIN = 0.4
-    """In pure noise two thirds turn back; with fewer than this it is below a step."""
+    """Least share of readings that turn back, for equal ones in a row to prove anything. In pure
+    noise two thirds do; with fewer the noise is below a step."""
     MORE, AND = 1.3, 0.02
-    """Where the reading lies between two steps changes the share of equal ones by about so much."""
+    """The expected share of equal readings is MORE times the usual one plus AND: it depends on
+    where the reading lies between two steps."""
 
     def __init__(self) -> None:
         self._last_c = math.nan

@@ -23,13 +23,13 @@ from thermoctl.regulator.heater.doubt import SDS, STANDS_K, Seen
 from thermoctl.regulator.heater.response import Block, Gain
 
 FELL_K, FELL_SDS = 0.2, 8.0
-"""A fall is one beyond both: a sensor that has found another vessel, and wanders about it, does not
-go so far and come back in step with the power."""
+"""A fall counts beyond both, in K and in standard deviations of a reading. A sensor that wanders in
+another vessel does not fall so far and come back in step with the power."""
 THERE_SDS = 2.0
-"""A reading this close to where it stood is there."""
+"""Standard deviations of a reading within which it is back where it stood."""
 ROWS_LEAST = 3
 FOLLOWED_S = 1800.0
-"""What comes back later comes back for another reason."""
+"""Time in s after the cut in which a reading must be back; later it has another reason."""
 TEXT = "without power the reading fell, with it it came back to {:.1f} degC and no further"
 
 

@@ -9,10 +9,10 @@ from thermoctl.quantities import clamp
 from thermoctl.ranges import check_ranges, ranged
 
 WEAKEST_K_PER_S = 6e-5
-"""What 50 W do to 200 l in a second."""
+"""Least gain in K/s of a healthy plant where nothing is configured: 50 W in 200 l."""
 LARGEST_J_PER_K = 400.0 * 4186.0
-"""No vessel takes more than that to warm by a kelvin: twice 200 l of water, for what else there is
-to be warmed and for what is lost meanwhile."""
+"""Largest heat capacity of a plant in J/K: twice that of 200 l of water, to allow for the vessel
+and for losses meanwhile."""
 
 
 @dataclass(frozen=True, slots=True)

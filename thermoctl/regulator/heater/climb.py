@@ -38,24 +38,27 @@ from thermoctl.regulator.heater.doubt import (
 from thermoctl.regulator.heater.response import LAGS_S, Block, Gain
 
 STRETCH_S, STRETCH_K, STRETCH_SDS = 8.0, 0.1, 6.0
-"""A stretch of a climb is no shorter, and no lower than both of these."""
+"""Least length of a stretch in s, and its least rise in K and in standard deviations of a reading;
+all three must be met."""
 STEEP = 0.9
-"""As steep as the one before it: what settles within 76 s is not."""
+"""Least rate of a stretch, as a share of that before it, for a climb to go on: what settles within
+76 s slows down by more."""
 KEEPS = 0.9
-"""With less than this share of the power of a climb nothing is expected,"""
+"""Share of the power of a climb below which no rise is expected."""
 AGAIN_S, AGAIN_LAGS = 180.0, 6.0
-"""nor before there is as much again for both of these: what took the heat away, a jug of cold water
-or a stirrer that stands, is then over, and heat that was on its way has come."""
+"""After less power a rise is expected again once as much has been back for both, in s and in lags.
+A jug of cold water or a stopped stirrer is over by then, and the heat under way has arrived."""
 MEMORY_S = 1800.0
-"""A climb is remembered for so long: the weather may be another one by then."""
+"""Time in s after which a climb is forgotten: the weather may have changed."""
 LEAST_SHARE = 0.2
-"""A rise by less of what full power does, or has done at best, is none: it may be the weather."""
+"""Least rate of a climb, as a share of what full power does, or has done at best. A slower rise may
+be the weather."""
 STALLS_S = 30.0
-"""A climb that is missing for so long is a doubt."""
+"""Time in s for which a whole climb may be missing before the heater is questioned."""
 STALLED_S = 32.0
-"""So long at least of a climb that has stalled."""
+"""Least time in s before the question that is looked at, of a climb that has stalled."""
 SHOWS = 0.3
-"""A heater is no weaker than this share of the gain that a climb has shown."""
+"""Least gain of the heater, as a share of the gain that a climb has shown."""
 
 
 class Climb:

@@ -20,63 +20,67 @@ from thermoctl.quantities import clamp
 from thermoctl.regulator.heater.response import LAGS_S, Block, Gain, Heat
 
 LEAST_K, SDS, LAGS = 0.3, 5.0, 1.0
-"""A sum is a doubt beyond these: in K, in standard deviations of a reading, in rises of a lag."""
+"""A sum is a doubt when it exceeds all three: LEAST_K in K, SDS standard deviations of a reading,
+and LAGS times the rise of one lag at full power."""
 LAGS_AGAIN = 0.4
-"""After a bad answer a second question is put sooner: to a heater that was mended it is harmless,
-and all this time another one heats what nobody sees."""
+"""LAGS after a bad answer. The second question comes sooner: it does no harm to a mended heater,
+and another one goes on heating unseen."""
 EXTRA_LAGS = 0.6
 CALM, CALM_SDS = 0.1, 2.0
-"""Below this share of its limit, or so many standard deviations of a reading, a sum is nothing, and
-the model may follow; were it to follow the quiet half of the noise only, it would drift."""
+"""A sum counts as nothing below CALM of its limit or CALM_SDS standard deviations of a reading, and
+the model may follow. With less it would follow the quiet half of the noise only, and drift."""
 HALF = 0.5
-"""So much of the heat may be missing: the gain of a tank whose water was doubled."""
+"""Share of the heat that may be missing: the gain of a tank whose water was doubled."""
 MUCH_SHARE, GROWS_SHARE = 0.4, 0.15
-"""Where the loss takes more of full power than the first, that would leave too little to be missed
-when a reading stands still: half of what the loss leaves may be missing, or the second of full
-power, for a loss that grows at once is no fault. That is of a reading that stands still; what falls
-faster, as with ice in the water, says nothing of the heater."""
+"""Where the loss exceeds MUCH_SHARE of full power, HALF of the heat would leave too little to be
+missed. There half of what the loss leaves may be missing, and GROWS_SHARE of full power at least,
+for a loss that grows at once is no fault. A fall of the reading does not count: ice in the water
+says nothing of the heater."""
 ANSWERED_S = 1800.0
-"""For so long after a good answer it is half of the heat all the same: an element of which half has
-burnt out would be asked again and again."""
+"""Time in s after a good answer in which HALF holds whatever the loss. Otherwise an element of
+which half has burnt out would be questioned again and again."""
 FULL_SHARE = 0.02
-"""And so much of full power: loss that wanders."""
+"""Share of full power that may be missing besides, since the loss wanders."""
 EXTRA_GAINS, EXTRA_SHARE = 2.5, 0.3
-"""So many times the gain, and so much of full power besides, is no stuck output."""
+"""A rise of up to EXTRA_GAINS times the known gain and EXTRA_SHARE of full power besides is no
+stuck output; only what exceeds their sum is added up."""
 SURE_SHARE = 0.7
-"""What a plant loses at least, of what its cooling says."""
+"""Least cooling of a plant, as a share of the estimated one."""
 COOLED_S = 100.0
-"""It is remembered for so long: an output that no longer obeys teaches a gain without it, by which
-what goes on rising is in order."""
+"""Time in s for which the cooling is remembered. A stuck output teaches a gain without cooling, by
+which its rise would look normal."""
 MEMORY_S, MEMORY_LAGS = 300.0, 10.0
-"""Memory of the quiet rates."""
+"""Time constant of the quiet rates: in s and in lags, the longer of the two."""
 SHOWS_SDS = 6.0
-"""Blocks are taken together until full power would move the reading by so many standard deviations.
-What a block may count is bounded by its heat, and noise that is cut off on that side alone hides
-for ever that a reading has stopped, where a weak cooler moves it by less than the noise."""
+"""Blocks are taken together until full power would move the reading by this many standard
+deviations. What a block may count is bounded by its heat; where a weak cooler moves the reading by
+less than the noise, cutting off the noise on that side alone would hide for ever that a reading has
+stopped."""
 FOLLOWS_SDS = 4.0
-"""They follow a rise beyond what full power does by noise of so many standard deviations: cut off,
-noise would no longer add up to nothing."""
+"""Standard deviations of a reading by which a rise may exceed that at full power for the quiet
+rates to follow all of it. Cut off sooner, the noise would not average out."""
 CREPT, CREPT_LEAST, CREPT_S = 0.12, 0.04, 100.0
-"""A loss that has doubled, but grown by no less and need not have grown by more of full power than
-these, for so long, while the reading has stood still: a sensor that shows the same for ever makes a
-controller add power little by little."""
+"""A reading that stands still is a doubt when the power it needs has grown for CREPT_S seconds by
+more than it was before; by CREPT_LEAST of full power at least, and CREPT is always enough. Under a
+sensor that shows the same for ever a controller adds power little by little."""
 NEEDED_S = 150.0
-"""Memory of the power that the reading needs at the time."""
+"""Time constant in s of the power that the reading needs."""
 CREPT_K = 0.3
-"""That much it would have moved the reading meanwhile; less, nobody could see."""
+"""Least rise in K that the added power must stand for; less could not be seen."""
 STANDS_K = 0.3
-"""A reading this close to where it was has stood still."""
+"""Distance in K from where it was within which a reading has stood still."""
 COMPARED_FROM_S, COMPARED_S = 600.0, 21600.0
-"""The loss it had is learnt for the first time, and forgotten over the second."""
+"""The power that a standing reading needs is learnt for COMPARED_FROM_S seconds; from then on it
+follows a larger one with a time constant of COMPARED_S seconds."""
 KEPT_K, KEPT_FROM_S = 1.5, 300.0
-"""Of a reading that has moved by no more it need not be learnt again: what a plant loses depends on
-its temperature, and is seen anew after so long."""
+"""After a move of less than KEPT_K kelvin that power is kept, and compared again after KEPT_FROM_S
+seconds: the loss depends on the temperature."""
 SETTLE_S = 300.0
-"""After a jump it is not known what the plant does without power."""
+"""Time in s after a jump in which no rise counts as extra."""
 COOLS_WITHIN_S = 1000.0
-"""Loss grows by a K in so many seconds for every K above where it was learnt: half a litre in a
-draught. What is hotter than ever before may take that much more power before it is a doubt; on a
-plant that was seen to cool faster, more."""
+"""For every kelvin above where the loss was learnt it may have grown by 1 K in this time in s, as
+that of half a litre in a draught; by more on a plant that was seen to cool faster. That much more
+power is no doubt."""
 
 
 class Seen(NamedTuple):

@@ -29,21 +29,21 @@ from thermoctl.regulator.heater.question import Answer, near, or_longer
 from thermoctl.regulator.heater.response import Gain
 
 SOUND, SURE = 5.0, 3.0
-"""Log of the odds from which on a heater is sound, 150 to one, and from which on the likelier claim
-is true, twenty to one: a reading that wanders by itself, because the sensor has found another
-vessel, looks like an answer once in a while."""
+"""Log odds above which a heater is sound, 150 to one, and above which the likelier claim counts as
+true, twenty to one. Once in a while a sensor that wanders in another vessel looks like an
+answer."""
 BEFORE_LAGS = 2.0
-"""What was seen for so long before the power began to grow belongs to it: the dip comes first."""
+"""Time before the power began to grow that counts too, in lags: the dip comes first."""
 ROWS_LEAST = 12
 WALKS = np.meshgrid((0.0, 1e-2, 1e-1, 1.0), 10.0 ** np.arange(-8.0, 1.0))
 OFF, MOVES = WALKS[0].ravel(), WALKS[1].ravel()
-"""Growth of the variances of e and d in a second, in those of a reading and of a reading a second.
-The first of each is next to none."""
+"""Growth per second of the variances of e and d, in variances of a reading and of a reading per
+second. The first value of each is next to none."""
 DIFFUSE = 1e8
-"""Variance of what is not known at all: the first reading, and the first d."""
+"""Variance of a state that is not known at all: the first reading, and the first d."""
 JUMP_SDS = 5.0
-"""What moves by more of these in a block, besides what full power does, is another sensor or
-another vessel, no load; what was before says nothing of it."""
+"""Standard deviations by which a block may move beyond what full power does. A larger move is
+another sensor or vessel, no load, and what was before it does not count."""
 
 
 def odds(

@@ -9,13 +9,14 @@ from thermoctl.regulator.heater.question import slope
 from thermoctl.regulator.heater.response import Gain
 
 WILD, RESTS = 1.3, 0.5
-"""A reading that falls faster than a heater which cools this much better than it heated: ice in the
-water, or a sensor in the air. What follows the cut is then no answer; it is over at the second.
-That nothing explains the fall is no answer either: the next heat has to be answered, and soon. Then
-no fall is wild: ice does not come and go with the power, but an actuator that is turned round does,
-and a Peltier element heats by more than it cools."""
+"""A fall, less the loss, is too fast for any heater beyond WILD times its gain, and over below
+RESTS times: ice in the water, or a sensor in the air. What follows the cut is then no answer, so
+the next heat has to be answered, and soon. From then on no fall is too fast: ice does not come and
+go with the power, but a reversed actuator does, and a Peltier element heats by more than it
+cools."""
 WILD_S = 60.0
-"""Such a fall is a doubt as soon as after a bad answer, once it lasts longer than water mixes."""
+"""Least time in s that such a fall must last to be questioned, at the limit that holds after a bad
+answer: longer than water takes to mix."""
 OVER = "the reading fell faster than any heater can make it: the next heat is what it is asked by"
 
 

@@ -15,9 +15,10 @@ from thermoctl.regulator.heater.question import Answer
 from thermoctl.regulator.heater.response import Gain
 
 HEARD_S, HEARD_LAGS = 20.0, 0.5
-"""A good answer is believed from then on, of a heater that is not known, and of one that is;"""
+"""Time after the cut from which on a good answer is believed: in s of an unknown heater, in lags of
+a known one."""
 BAD_S, BAD_LAGS = 60.0, 2.0
-"""a bad one from then on."""
+"""The same for a bad answer."""
 LIKELY = "{:.0f} s without power do not show it surely, but a gain of {:.2g} K/s is likely"
 LOAD = "after {:.0f} s without power a load explains why more was needed, a dead heater does not"
 HIDDEN = "{:.0f} s without power show less than a load that comes and goes may hide"
@@ -46,7 +47,7 @@ def answer(
     sd_k : float
         Standard deviation of a reading, in K.
     sure : float
-        So many standard deviations an answer has to differ from nothing.
+        Standard deviations by which an answer has to differ from nothing.
     """
     found, shown = question.of_known_rows(rows, cut.from_s, cut.at_s, known, sd_k, sure)
     late = sure < question.SURE

@@ -27,24 +27,26 @@ from thermoctl.regulator.heater.response import LAGS_S, Gain
 from thermoctl.regulator.heater.trial import RISE_K, RISE_SDS
 
 SURE = 5.0
-"""A gain is known from so many standard deviations on,"""
+"""Standard deviations from 0 beyond which a gain is known."""
 ARRIVED_LAGS, ARRIVED_S = 0.5, 10.0
-"""and once heat for so many lags has arrived, and for so many seconds at full power: a start in the
-middle of a warm-up finds a reading that rises by heat of before, whatever power there is now."""
+"""Heat that must have arrived before a gain is known, in lags and in s at full power, the larger of
+the two. A start in the middle of a warm-up finds a reading that rises by earlier heat, whatever
+power there is now."""
 RECALLED_S = 600.0
-"""So long what an earlier run knew is better than what this one has learnt."""
+"""Time in s in which the memory of an earlier run prevails over what this one has learnt."""
 OUTDONE = 1.1
-"""So many times what full power does is mains that are high, and more is another plant."""
+"""Largest rise that a remembered heater explains, as a multiple of its rise at full power: the
+mains may be high. A larger one is that of another plant, and ends the memory."""
 NEARLY_FULL = 0.9
-"""It has to show a rise only at so much power."""
+"""Power above which a remembered heater has to show a rise."""
 CHANGED, AT_ONCE = 0.7, 3.0
-"""A gain below this share of the one that was known is the new one; so is one as far above it, but
-no more than so many times the old one at once."""
+"""A gain below CHANGED of the known one replaces it, and so does one as far above it, but by no
+more than AT_ONCE times the known one at once."""
 OFF_LAGS = 1.5
-"""After so many lags without power nothing is under way any more."""
+"""Time without power, in lags, after which no heat is under way."""
 EASED, OBEYS_LAGS, RISES = 0.7, 5.0, 0.2
-"""A lag has been seen when less than this share of the power was given for so many, and the reading
-rose beyond what has arrived by less than this share of what full power does."""
+"""A lag has been seen when the power was below EASED of its maximum for OBEYS_LAGS lags, and the
+reading rose beyond the heat that arrived by less than RISES of what full power does."""
 
 
 class KnownHeater:

@@ -14,11 +14,11 @@ from thermoctl.ranges import number
 from thermoctl.regulator.heater.response import COOLS_MOST, LAGS_S, Gain
 
 NAME: Final = "heater-check"
-"""Under which it is kept, beside the models of the laws."""
+"""Key of the heater in the record, beside the models of the laws."""
 COOLER_NAME: Final = "cooler-check"
-"""Under which the cooler is, where there is one beside the heater."""
+"""Key of the cooler, where there is one beside the heater."""
 GAIN_MOST = 1e3
-"""No heater is stronger, in K/s."""
+"""Largest gain in K/s that is recalled."""
 
 
 def remember(known: Gain) -> dict[str, float]:

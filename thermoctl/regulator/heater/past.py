@@ -17,19 +17,19 @@ from collections import deque
 from enum import Enum
 
 LEAST = 5
-"""Blocks, before anything is said."""
+"""Least number of blocks before anything is said."""
 CLEAR_SDS = 10.0
-"""A rise is clear beyond so many standard deviations of a reading."""
+"""Standard deviations of a reading beyond which a rise is clear."""
 BENT = 0.7
-"""From cold less than this share of what a reading rises lately, it rose at first: with a lag of a
-single block .57, with a longer one less. What goes on from before is the same at both ends."""
+"""From cold the first rise is below this share of the latest: 0.57 of it with a lag of a single
+block, less with a longer one. Heat from before raises both ends alike."""
 MOVES = 0.05
-"""Power this close to what it was has not moved, and teaches nothing."""
+"""Largest change of power that counts as none, and teaches nothing."""
 BEGINS = 15
-"""So many blocks a rise may take to be clear, whatever the power does: a law that sees heat
-of before brakes at once."""
+"""Number of blocks that a rise may take to be clear, whatever the power does: a law that sees
+earlier heat brakes at once."""
 LONGEST = 75
-"""After so many blocks without a clear rise it makes no difference."""
+"""Number of blocks without a clear rise after which it makes no difference."""
 
 
 class Past(Enum):

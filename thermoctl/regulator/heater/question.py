@@ -25,34 +25,35 @@ from thermoctl.regulator.heater.response import LAGS_S, Gain
 
 ROWS_LEAST = 6
 SURE = 4.0
-"""A gain differs from nothing at so many standard deviations."""
+"""Standard deviations from 0 beyond which a gain differs from nothing."""
 ANSWERS, NOTHING = 0.35, 0.3
-"""Of the known gain: so much is an answer, of whatever sign, and less than that is none."""
+"""Shares of the known gain. A gain above ANSWERS is an answer, of whatever sign; one below NOTHING
+is none."""
 WANDERS = 0.5
-"""What is left over and resembles its neighbours is as good as few readings, and its error is known
-from those: an unknown heater has to answer by so much more where they are all alike. At the same
-four deviations the air around a sensor that hangs beside its tank answered for it."""
+"""Remainders that resemble their neighbours are worth few readings, and the error is known from
+these alone. An unknown heater has to answer by up to this share more clearly for it. With four
+deviations throughout, the air around a sensor beside its tank passed for an answer."""
 RULED_OUT = 2.0
-"""A gain is ruled out so many standard deviations away: it is looked at a hundred times, and once
-is enough. At 1.6 three of 20 heaters were condemned that were as weak as any may be."""
+"""Standard deviations beyond which a gain is ruled out. It is tested a hundred times, and once is
+enough: at 1.6 three of 20 heaters were condemned that were as weak as any may be."""
 USELESS = 0.1
-"""A heater that does not make up for this share of the loss has no use that anybody could see."""
+"""Least effect of a heater, as a share of the loss; one that makes up for less counts as none."""
 WORTH_MOST = 0.95
 CAUTION = 1.5
 LATE = 0.5
-"""A longer lag has to leave less than this share over, of the squares, before it is one. A lag may
-grow while nobody looks, at rest, and heat that arrives after the cut is that of a heater which
-cools, under the lag that was learnt."""
+"""Share of the squared remainders below which a longer lag explains the readings. A lag may grow
+unnoticed, at rest; under the learnt one, heat that arrives after the cut is that of a heater that
+cools."""
 BEFORE_LAGS, BEFORE_S = 1.5, 16.0
-"""What was before the cut is looked at for so long."""
+"""Time before the cut that is looked at, in lags and in s, the longer of the two."""
 CREPT_LAGS = 4.5
-"""So long where the reading has stood still: there is nothing to compare, were it shorter."""
+"""BEFORE_LAGS of a reading that has stood still: less would leave nothing to compare."""
 LONGEST_S, LONGEST_LAGS, LONGEST_SDS = 240.0, 12.0, 20.0
-"""A known heater that has not answered by then does not answer; nor before it would have warmed the
-water by so many standard deviations of a reading."""
+"""Longest wait for the answer of a known heater: in s, in lags, and in standard deviations of a
+reading over the gain, the longest of the three."""
 LIKELY = 1.0
-"""After so long noise is what hides the answer, and the likelier of two is taken: a heater that
-warms by as many standard deviations is not condemned."""
+"""Standard deviations after that wait above which a gain clears the heater: noise hides the answer,
+and the likelier of the two is taken."""
 _NOT_SEEN = Gain(math.nan, math.nan, 0)
 
 

@@ -34,27 +34,31 @@ Heat = tuple[float, ...]
 LAGS_S = (4.0, 9.0, 20.0, 45.0, 90.0, 150.0)
 """Total lags from power to reading; each is two equal poles."""
 BETWEEN_S = (6.0, 13.0, 30.0, 64.0)
-"""More of them for the regression: between two lags the gain would be wrong by half."""
+"""More lags in s, for the regression alone: between two of LAGS_S the gain would be wrong by
+half."""
 TREND_S = 100.0
-"""Memory of the straight line."""
+"""Time constant in s of the fading straight line."""
 MEMORY_S = 1500.0
-"""Memory of the regression, in time during which power moved."""
+"""Time constant in s of the regression, counted while power moves."""
 MEAN_S = 50.0
-"""Memory of that mean."""
+"""Time constant in s of the mean power, from which a move is told."""
 ALIKE = 4.0
-"""What remains of one block resembles the next, so errors are larger than they look."""
+"""Factor on all errors: the remainder of one block resembles the next."""
 BLOCKS_LEAST = 4.0
 COOLS_SURE = 3.0
-"""A loss that grows with the reading is one from so many standard deviations on,"""
+"""Standard deviations beyond which a loss that grows with the reading counts."""
 COOLS_S, COOLS_MOST = 100.0, 1.0 / 30.0
-"""and is expected to be about one part in so many seconds, if any, and no more than the second."""
+"""Such a cooling is expected to be one part in COOLS_S seconds, if any, and taken as COOLS_MOST per
+second at most."""
 JUMP_K, JUMP_SDS, JUMP_GAINS = 0.5, 10.0, 3.0
-"""A reading that moves by more in a block than these is no drift: somebody poured."""
+"""A reading that moves in a block by more than all three has jumped, since somebody poured: in K,
+in its standard deviations, and in rises at full power."""
 STORED_K = 60.0
-"""No heater has more under way, in K. A block that gives its heat away within seconds follows its
-power, and so does what a long lag makes of ten times the gain, for the few minutes of a warm-up."""
+"""Most heat under way in K; a lag under which there were more is left out. A block that gives its
+heat away within seconds follows its power, and so does a long lag with ten times the gain, for the
+few minutes of a warm-up."""
 MIXES_S = 100.0
-"""So long after that nothing is learnt: what was poured is still being mixed, and the rebound of
+"""Time in s after a jump in which nothing is learnt: the water is still mixing, and the rebound of
 the reading would pass for a heater of thirty times the gain."""
 
 

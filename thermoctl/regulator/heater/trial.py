@@ -16,17 +16,17 @@ from thermoctl.regulator.heater.doubt import Seen
 from thermoctl.regulator.heater.response import LAGS_S, Block
 
 RISE_K, RISE_SDS = 0.1, 6.0
-"""A rise beyond both is one."""
+"""A rise counts beyond both, in K and in standard deviations of a reading."""
 LISTENS_S, LISTENS_LAGS = 1200.0, 3.0
-"""An answer is waited for so long where listening tells; else for so many of the longest lags."""
+"""Longest wait for an answer: in s where listening tells, otherwise in longest lags."""
 TELLS = 0.4
-"""Listening tells where the weakest heater would move the reading by so many standard deviations
-with its first heat: of 150 readings before and after, one knows a step to .2 of them."""
+"""Listening tells where the first heat of the weakest heater moves the reading by more than this
+many standard deviations: 150 readings before and after it show a step to 0.2 of them."""
 MORE, TWICE = 1.5, 2.0
-"""The next heat is larger by these, where listening tells and where it does not."""
+"""Factor of the next heat, where listening tells and where it does not."""
 IN_ALL = 15.0
-"""No heat is given beyond so many times the first, 15 minutes, unless it is likely to heat: a
-converter that stands still, or noise, would hide the answer of any plant until the water boils."""
+"""Most heat in all, in first heats (15 minutes), unless it is likely to heat: a converter that
+stands still, or noise, would hide the answer of any plant until the water boils."""
 
 
 class Trial:

@@ -1,8 +1,8 @@
 """Whether the reading answers to the power, and what is done when it does not.
 
-A heater that is known is watched by `HeatDoubt`. One that is not yet known has so many seconds of
-full power to show a rise. Whoever is in doubt is asked: the power is cut for some lags, whatever
-the controller wants, and `question` reads the answer. None, or the wrong one, is SAFE, and for
+A heater that is known is watched by `HeatDoubt`. One that is not yet known has some seconds of full
+power to show a rise (`Trial`). A heater in doubt is asked: the power is cut for some lags, whatever
+the controller wants, and `question` reads the answer. No answer, or the wrong one, is SAFE, and for
 the second time LATCHED; a reading that goes on rising without power is LATCHED at once.
 """
 
@@ -25,13 +25,14 @@ from thermoctl.regulator.heater.trial import Trial
 from thermoctl.regulator.supervisor import Emit
 
 OFF = 0.01
-"""Power below this is none."""
+"""Power below which the output counts as off."""
 RISES = 0.3
-"""A reading that rises by so much of what full power does, without any, is heated all the same."""
+"""If, at power 0, the reading rises at more than this share of the full-power rate, the heater is
+stuck on."""
 LATELY_S = 1800.0
-"""A second verdict within this time latches."""
+"""Time in s after a verdict within which a second one latches."""
 ROWS = 450
-"""Blocks that are remembered: half an hour at a second's period."""
+"""Number of blocks that are remembered: half an hour at a period of 1 s."""
 
 _FAULTS = {"heater.no_response": 23, "heater.reversed": 3, "heater.stuck_on": 24}
 
@@ -60,11 +61,11 @@ class HeaterWatch:
         self._response, self._doubt, self._climb = HeatResponse(), HeatDoubt(), Climb()
         self._supervisor, self._emit = supervisor, emit
         self._heater, self._trial, self._ceiling = KnownHeater(), Trial(check), Ceiling()
-        self._settled_s = 0.0  # from then on, what was on its way at the start has arrived
+        self._settled_s = 0.0  # time at which all heat from before the start has arrived
         self._rows: deque[Seen] = deque(maxlen=ROWS)
         self._cut: Cut | None = None
         self._t_s = self._off_s = 0.0
-        self._failed_s = self._refused_c = -math.inf  # the latter: what one that was is to pass
+        self._failed_s = self._refused_c = -math.inf  # the latter: readings above it teach again
         self._distrusted_k = 0.0  # heat that must be answered before anything is learnt again
 
     @property
