@@ -19,14 +19,14 @@ AHEAD_S = 60.0
 
 
 class Inexact(NamedTuple):
-    """By how much an output is off its commands.
+    """Error of an output against its commands.
 
     Parameters
     ----------
     more : float
-        How much more power than the command it gives, in the mean of some time.
+        Mean error of the power: above 0 it gives more than the command.
     pulses_s : float
-        For so long it is still taken for a relay, which gives more and then nothing.
+        Time in s for which it still counts as a relay, which gives more and then nothing.
     """
 
     more: float = 0.0

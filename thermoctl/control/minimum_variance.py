@@ -26,7 +26,7 @@ HOLDING_SD_MAX = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """What the law has met of late and a person should know.
+    """Conditions that the law has met of late and an operator should know.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class SelfTuningMinimumVariance:
         return Conditions()
 
     def observe(self, belief: Conditions, situation: Situation) -> Conditions:
-        """Return what the parameters of this sample are a case of."""
+        """Return which conditions the parameters of this sample meet."""
         zero, gain_k = self._zero_and_gain(situation.estimate.theta)
         zeros = gain = ""
         if zero >= self.zero_radius:
@@ -146,7 +146,7 @@ class SelfTuningMinimumVariance:
         """Return the power for which ``Arx`` predicts the reference; O21 (23).
 
         Before the start the plant is taken to have rested, and in a gap of the readings to have
-        been where it is now: without a power for so long as n samples it would never be learnt.
+        been where it is now. Without a power during n samples nothing would ever be learnt.
         """
         n, theta = structure.n, situation.estimate.theta
         now_c = situation.temperature_c

@@ -34,8 +34,8 @@ SIGMAS = 6.0
 NOISES = 5.0
 """Least deviation that counts, in standard deviations of a reading."""
 FRESH, FRESH_TIMES = 2, 2.0
-"""What is usual is known after as many blocks as the line has. Before that, and after so many short
-times, a deviation has to be so many times as large."""
+"""Number of short times after which deviations count, and the factor by which they have to be
+larger until there are as many blocks as in the line: what is usual is not known before."""
 FLAT, FLAT_USUAL = 0.05, 0.5
 """Largest growth in a short time for a change to be over: a share of the change itself, and one of
 the usual deviation."""

@@ -54,7 +54,7 @@ class Compared:
 
 
 class Lasting:
-    """Whether a comparison stands: so often in a row to begin, and to end.
+    """Whether a comparison stands; several in a row begin it, and end it.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ class Witness:
         return self._law.plant(self._belief)
 
     def _begun(self, applied: float) -> AdaptiveBelief:
-        """Return the belief to begin with: of a plant nobody has told of, that it is met cold."""
+        """Return the belief to begin with; an unknown plant is taken to be met cold."""
         if self._told is None:
             return self._law.start()
         kept = self._told.remember().get(self._law.name)

@@ -19,7 +19,7 @@ def number(value: float, sd: float) -> str:
 
 
 def plain(value: float, decimals: int = 0) -> str:
-    """Return `value` with so many decimals, and a true minus."""
+    """Return `value` with this number of decimals, and a true minus."""
     return _signed(value, f",.{decimals}f") if math.isfinite(value) else UNKNOWN
 
 

@@ -42,7 +42,7 @@ class Learning:
         self._foreseen: IdentifierBelief | None = None
         self._holding = Holding()
         self.kept_s = 0.0
-        """Time constant with which what acts comes down when power is taken back, in s."""
+        """Time constant in s with which the body that acts cools when power is reduced."""
 
     @property
     def estimate(self) -> Estimate:

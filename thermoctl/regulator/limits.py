@@ -37,8 +37,8 @@ class Limits:
         The hardware may take this much more than it was told before it counts as a fault.
     window_s, cooler_window_s : float
         How long heater or cooler may take over a command, at most: the window in which it takes its
-        power anew, or the least time it stays on. So many seconds of full power may be reported
-        beyond the commands before that is a fault; 0: two reports in a row are one.
+        power anew, or the least time it stays on. As many seconds of full power may be
+        reported beyond the commands before that is a fault; 0: two reports in a row are one.
     jump_widens : bool
         Whether a reading may also lie as far off as the gain that is believed in explains.
     power_min : float

@@ -1,8 +1,8 @@
 """Heat that an output gives beyond its commands, kept as an account.
 
 An output that is late and one that is stuck report the same; what tells them apart is how much they
-go on to give. A relay that takes its duty once in ten seconds, or stays on for at least so long,
-owes a command no more than ten seconds of full power. What is stuck goes on.
+go on to give. A relay that takes its duty once in ten seconds, or stays on for ten at least, gives
+no more than ten seconds of full power beyond its commands. What is stuck goes on.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ line."""
 
 
 class Overdrawn(NamedTuple):
-    """What the reports of an output come to since it last owed nothing.
+    """Account of the reports of an output, since it last owed nothing.
 
     Parameters
     ----------

@@ -111,12 +111,12 @@ class Pair:
 
     @property
     def moved_k(self) -> float:
-        """What their lags may put between them, in K, whichever is the slower."""
+        """Largest difference in K that their lags explain, whichever is the slower."""
         return max(self.first.moved_k, self.second.moved_k)
 
     @property
     def shared_k(self) -> float:
-        """How far both of them moved, in K: next to nothing where one jumps by itself."""
+        """Move in K that both of them share: next to nothing where one jumps alone."""
         return min(self.first.moved_k, self.second.moved_k)
 
 

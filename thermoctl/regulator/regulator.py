@@ -258,9 +258,9 @@ class Regulator:
         return self._command.power if self._applied is None else self._applied
 
     def _commanded_power(self) -> float:
-        """Return the power that was commanded; NaN where whoever follows may be off by any share.
+        """Return the commanded power; NaN where it is the set point of a following loop.
 
-        It is another loop then, which takes its time, and nothing to be made up for.
+        That loop takes its time, and what it is off by is no error of an output.
         """
         return self._command.power if self._limits.applied_tolerance < 1.0 else math.nan
 
@@ -285,11 +285,11 @@ class Regulator:
         if is_finite_number(t_s) and t_s > before_s:
             self._t_s = float(t_s)
             return self._t_s, self._t_s - before_s
-        self._t_s = before_s + period_s  # lost in rounding where a time is absurd, hence:
+        self._t_s = before_s + period_s  # an absurdly large time rounds it away:
         return self._t_s, period_s
 
     def _weigh(self, interval_s: float, applied: float, off: float, temperature_c: float) -> None:
-        """Keep the balance of heat; the output was `off` its command, NaN: nobody knows."""
+        """Add to the balance of heat; `off` is output less command, NaN: unknown."""
         beyond, lag_s = off if math.isfinite(off) else 0.0, self._beliefs.lag_s
         if self._feasibility.observe(interval_s, applied, temperature_c, lag_s, beyond):
             self._feasibility.reckon(self._wanted(), self._t_s or 0.0)

@@ -64,7 +64,7 @@ class Supervisor:
         self._measurement = Measurement(math.nan)
         self._good_s = 0.0  # good readings without a break
         self._blind_s = 0.0  # time without a good reading that was not paid back yet
-        self._forsaken = False  # SAFE for missing readings alone, no other of which is a new fault
+        self._forsaken = False  # SAFE for missing readings alone; one more is no new fault
         self._tripping: Verdict | None = None
         self._tripped_lately = False
         self._opened_s: deque[float] = deque(maxlen=limits.OPEN_COUNT)

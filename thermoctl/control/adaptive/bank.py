@@ -356,7 +356,7 @@ class Bank:
         return reckoned(gains, step, belief.full, belief.weights, self.constants)
 
     def _drifted(self, belief: BankBelief, still: bool, sds: float) -> Drifting:
-        """Return the sums after an innovation of so many standard deviations."""
+        """Return the sums after an innovation of `sds` standard deviations."""
         rest = max(self.hearing.quiet_lags * self._lag(belief), QUIET_SAMPLES)
         return belief.drifting.after(still, sds, rest, self.hearing)
 

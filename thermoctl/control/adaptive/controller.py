@@ -240,7 +240,7 @@ class Adaptive:
         return belief.surprise_k
 
     def beliefs(self, belief: AdaptiveBelief, situation: Situation) -> Beliefs:
-        """Return gain with its error, lag, and holding power once it is known to .05."""
+        """Return gain with its error, lag, and holding power once it is known to 0.05."""
         outlook, sds = belief.bank.outlook, belief.sds
         if outlook is None:
             return Beliefs()

@@ -304,7 +304,7 @@ class SelfTuningGpc:
         return self._sign * (self._seen(situation).measured_c - expected_c)
 
     def beliefs(self, belief: GpcBelief, situation: Situation) -> Beliefs:
-        """Return gain with its error, lag, and holding power once it is known to .05."""
+        """Return gain with its error, lag, and holding power once it is known to 0.05."""
         learnt, learner = belief.learnt, self.learner
         if not belief.record.has_begun:
             return Beliefs()

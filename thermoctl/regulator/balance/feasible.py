@@ -103,13 +103,13 @@ class Wanted:
 
 
 class Standing:
-    """Whether something was said of the plant long enough; it ends more slowly."""
+    """Whether a condition has held for long enough; it ends more slowly."""
 
     def __init__(self) -> None:
         self.stands, self._contrary = False, 0
 
     def weigh(self, sds: float, *, counts: bool) -> bool:
-        """Take in by how many deviations a stretch says so; return if it is news."""
+        """Take in its standard deviations in a stretch; return whether it changed."""
         stood, far = self.stands, sds > (OVER_SDS if self.stands else SURE_SDS)
         self._contrary = 0 if far is stood else self._contrary + 1
         if self._contrary >= STEADY or not counts:
@@ -213,7 +213,7 @@ class Feasibility:
         self._nearing.clear()
 
     def fail(self, failure: Failure) -> None:
-        """Forget what could not be reckoned with, and say so once.
+        """Begin anew after a computation that failed, and say so once.
 
         No power depends on it, so none is taken away.
         """
@@ -322,7 +322,7 @@ class Feasibility:
         full, none = self._heat >= FULL * wanted.power_max, abs(self._asked) <= NONE
         missing_sds = _missing_sds(belief, wanted, full)
         if self._nearing.arrives(wanted.setpoint_c) and not wanted.beyond_ceiling:
-            missing_sds = 0.0  # what holds it back gives way
+            missing_sds = 0.0  # the limit moves on to the set point
         driven_sds = self._driven_sds(belief, wanted, none)
         for code, sds, words in (
             (UNREACHABLE, missing_sds, _missing_words),

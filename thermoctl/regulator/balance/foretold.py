@@ -1,4 +1,4 @@
-"""What was told of a set point before, and has turned out otherwise since.
+"""Errors of past forecasts for a set point; they widen those of the next.
 
 The errors of a balance of heat are those of its own model. No model is the plant: a wall follows
 more slowly than was thought, a controller is more careful than it need be. Either shows in what was
@@ -24,7 +24,7 @@ day."""
 
 
 class Slip:
-    """By how much a set point is reached later than was told.
+    """How much later than forecast a set point is reached.
 
     An arrival supposes all the power there is. A controller that is more careful, for whatever
     reason, does not come nearer in time as the clock goes on.
@@ -35,7 +35,7 @@ class Slip:
         self._late_s = 0.0
 
     def doubted(self, arrival: Known, setpoint_c: float, t_s: float) -> Known:
-        """Return an arrival told at `t_s` with what those before it were wrong by."""
+        """Return an arrival forecast at `t_s`, in doubt by the errors of earlier ones."""
         if setpoint_c != self._setpoint_c:
             self._setpoint_c, self._due_s, self._late_s = setpoint_c, math.nan, 0.0
         elif self._late_s > 0.0:
@@ -48,7 +48,7 @@ class Slip:
 
 
 class Settling:
-    """How far the power that holds a set point is from what it was said to be.
+    """How far a holding power is from what was reported before.
 
     It goes on changing for as long as walls of any kind take up heat, or give it back.
     """
@@ -57,7 +57,7 @@ class Settling:
         self._setpoint_c = self._told_s = self._before = math.nan
 
     def doubted(self, holding: Known, setpoint_c: float, t_s: float) -> Known:
-        """Return a holding power told at `t_s` with what it has changed by lately."""
+        """Return a holding power told at `t_s`, in doubt by its changes of late."""
         if not math.isfinite(holding.mean):
             return holding
         if setpoint_c != self._setpoint_c or math.isnan(self._before):
@@ -70,7 +70,7 @@ class Settling:
 
 
 class Nearing:
-    """Whether the farthest that power holds is itself on its way to the set point.
+    """Whether the farthest temperature that power holds moves to the set point.
 
     Goods behind quick air give off heat for hours. It looks like a loss with a steep slope, and so
     like an end of the way; but that end moves on as they follow. That of a plant which loses as

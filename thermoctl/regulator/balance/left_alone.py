@@ -70,12 +70,12 @@ class LeftAlone:
         self._mean_s = self._total_cs = self._stays = 0.0
 
     def seen(self, reading_c: float) -> None:
-        """Take in where the plant is; as low as it was once it may be at rest."""
+        """Take in the reading; at the lowest one the plant may be at rest."""
         self._lowest_c = min(self._lowest_c, reading_c)
 
     @property
     def waited(self) -> bool:
-        """Whether all heat has come, that of before a start as well."""
+        """Whether all heat has arrived, also that from before a start."""
         return self._alone_s > WAITS_S
 
     @property

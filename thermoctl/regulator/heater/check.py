@@ -56,7 +56,7 @@ class HeaterCheck:
 
     @property
     def of_cooler(self) -> HeaterCheck:
-        """How that cooler is checked; how weak it may be, nobody has said."""
+        """How that cooler is checked; no least gain is configured for it."""
         weakest_k_per_s = min(self.weakest_k_per_s, WEAKEST_K_PER_S)
         return replace(self, action="cool", weakest_k_per_s=weakest_k_per_s)
 
@@ -74,10 +74,9 @@ class Reacts(Protocol):
 
 
 def weakest_of(heater_w: float | None) -> float:
-    """Return the least rise in K/s at full power that a heater of so many W makes.
+    """Return the least rise in K/s at full power that a heater of this power makes.
 
-    Heat goes somewhere: what is rated at 4 kW warms no vessel as slowly as 50 W may. Unknown, it
-    may be that weak.
+    4 kW warm no vessel as slowly as 50 W may. Where the power is not known, 50 W are assumed.
     """
     rate = 0.0 if heater_w is None else heater_w / LARGEST_J_PER_K
     return clamp(rate, WEAKEST_K_PER_S, 0.5)

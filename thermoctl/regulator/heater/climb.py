@@ -191,7 +191,7 @@ class Climb:
 
 
 def _arrived(known: Gain | None, start: Seen, now: Seen) -> float:
-    """Return the power that arrived from `start` to `now`; the most of any lag, of one unknown."""
+    """Return the power that arrived from `start` to `now`; of an unknown lag the most."""
     places = range(len(LAGS_S)) if known is None else (known.place,)
     heat_s = max(now.heat_s[place] - start.heat_s[place] for place in places)
     return heat_s / (now.t_s - start.t_s)

@@ -78,7 +78,7 @@ def odds(
 
     def likelihood(gain: Array) -> float:
         rest = squares - gain * (2.0 * products - gain * heats)
-        scale = np.maximum(rest / n, 1.0)  # readings may be worse than they are said to be
+        scale = np.maximum(rest / n, 1.0)  # the noise may be larger than `sd_k` says
         return float((-0.5 * (sizes + n * np.log(scale) + rest / scale)).max())
 
     sound = likelihood(np.maximum(best, CHANGED * known.mean))
@@ -86,7 +86,7 @@ def odds(
 
 
 def weigh(answer: Answer, log_odds: float, *, crept: bool, late: bool) -> Answer:
-    """Return `answer`, or what is made of it where a load may have given it.
+    """Return `answer`, corrected where a load may have caused it.
 
     An answer that is late is one, unless what came before denies it. A reading that does not
     answer, while all that came before says it did, is bent by a load. Where
@@ -147,7 +147,7 @@ def _innovations(
         both = both + span_s * own_rate + span_s**2 / 2.0 * MOVES
         own_rate = own_rate + span_s * MOVES
         size, new = own + 1.0, now - level
-        if place >= 2:  # two are used up by where it begins
+        if place >= 2:  # the first two fix where it begins
             part = new / size[:, None]
             crosses += part * new[:, :1]
             squares += part * new

@@ -1,10 +1,10 @@
 """A loop that heats by the temperature of a block, watched by its flow of heat.
 
-What such a loop calls power is where the block stands between two temperatures. A bath as warm as
-the block gets no heat at all, and that is rarely at power 0: in a bath of 37 °C a block never
-cools to 20. Held against that power the bath would seem to lose half of what it gets, and where
-so much is lost a reading that stands still is no surprise. The heat that flows goes by the
-difference of the two, and is 0 when the block is asked for nothing.
+The power of such a loop is the place of the block between two temperatures. That is not the heat
+that flows: a bath as warm as the block gets none, and a block in a bath of 37 °C never cools to the
+20 °C of power 0. By that power the bath would seem to lose half of what it gets, and a reading that
+stands still would hardly be missed. The heat that flows follows the difference of block and bath,
+and is 0 when the block is asked for nothing.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ class Sides:
         return self.heater.ceiling_c
 
     def observe(self, t_s: float, interval_s: float, reading_c: float, applied: float) -> None:
-        """Show the last interval and the reading at its end to whoever it concerns."""
+        """Show the last interval and the reading at its end to the watch concerned."""
         acts = int(applied > OFF) - int(applied < -OFF)
         if acts != self._acts:
             self._acts = acts

@@ -135,7 +135,7 @@ class HeaterWatch:
     # -- a block ---------------------------------------------------------------------------------
 
     def _meet(self, block: Block, t_s: float) -> None:
-        """Make of a block what there is to be made."""
+        """Evaluate a complete block."""
         known, sd_k = self._heater.gain, block.sd_k
         self._t_s += block.span_s
         self._off_s = self._off_s + block.span_s if block.power < OFF else 0.0
