@@ -34,6 +34,8 @@ def draw_posterior(panel: Any, weighing: Weighing, record: Record, unit_s: float
     for place, y, hue in zip(places, apart, house.HUES, strict=False):
         house.label(panel, y, order_text(weighing.orders[place]), hue)
     panel.axhline(SETTLED, color=house.ALLOWED, linewidth=0.8, zorder=0)
+    words: Any = {"transform": panel.get_yaxis_transform(), "va": "top", "fontsize": 6.5}
+    panel.text(0.006, SETTLED - 0.02, f"settled: {percent(SETTLED)}", color=house.MUTE, **words)
     panel.set_ylim(-0.03, 1.05)
     panel.set_yticks((0.0, 0.5, 1.0))
     panel.set_ylabel("probability")

@@ -89,7 +89,9 @@ def _time_unit(result: Replay) -> tuple[float, str]:
     return house.time_unit(float(result.record.t_s[-1]))
 
 
-def draw_record(record: Record, output: Any, entry: Any, unit_s: float) -> None:
+def draw_record(
+    record: Record, output: Any, entry: Any, unit_s: float, entry_name: str = "applied"
+) -> None:
     """Draw what was recorded: output as a line, input as steps with area."""
     longest = GAP * record.period_s / unit_s
     t, y = house.broken(record.t_s / unit_s, record.y, longest)
@@ -100,7 +102,7 @@ def draw_record(record: Record, output: Any, entry: Any, unit_s: float) -> None:
     entry.step(t, u, where="post", color=house.SLATE, linewidth=0.8)
     entry.set_ylim(bottom=min(0.0, float(np.min(record.u))))
     house.label(output, float(record.y[-1]), "measured", house.INK)
-    house.label(entry, float(record.u[-1]), "applied", house.SLATE)
+    house.label(entry, float(record.u[-1]), entry_name, house.SLATE)
     output.set_ylabel("output")
     entry.set_ylabel("input")
     house.score(output, f"{record.names.output} · {len(record.t_s):,} samples")

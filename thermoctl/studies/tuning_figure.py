@@ -79,7 +79,7 @@ def _draw_run(tuning: Tuning, excitation: Excitation, panels: list[Any]) -> None
     """Draw temperature, power and, where orders were weighed, their probabilities."""
     record = tuning.record
     unit_s, unit = house.time_unit(float(record.t_s[-1]))
-    draw_record(record, panels[0], panels[1], unit_s)
+    draw_record(record, panels[0], panels[1], unit_s, entry_name="taken")
     panels[0].axhspan(
         excitation.bottom_c, excitation.top_c, color=house.ALLOWED, alpha=0.5, linewidth=0
     )
@@ -89,6 +89,7 @@ def _draw_run(tuning: Tuning, excitation: Excitation, panels: list[Any]) -> None
         panels[0],
         f"band {excitation.bottom_c:g} to {excitation.top_c:g} °C · {len(record.t_s):,} samples",
     )
+    house.score(panels[1], "as the board took it: accepted_power in run.csv")
     if not tuning.given:
         draw_posterior(panels[2], tuning.weighing, record, unit_s)
     for panel in panels:
@@ -110,13 +111,15 @@ def _draw_answer(tuning: Tuning, words: PlantWords, panel: Any) -> None:
     ends = house.spread_out(
         [float(rise[-1]), float(slope * (t[-1] - lag_s))], _LABEL_GAP * float(rise[-1])
     )
-    for y, text, hue in zip(ends, ("model", "gain, lag"), (house.BELIEF, house.MUTE), strict=True):
+    for y, text, hue in zip(
+        ends, ("model", "gain, after lag"), (house.BELIEF, house.MUTE), strict=True
+    ):
         house.label(panel, y, text, hue)
     gain, lag = (
         number(each.value, 0.25 * ((each.high or each.value) - each.low))
         for each in (words.gain_k_per_min, words.lag_s)
     )
-    house.score(panel, f"gain {gain} K/min · lag {lag} s")
+    house.score(panel, f"solid: model · dashed: gain {gain} K/min after a lag of {lag} s")
 
 
 def _answer(tuning: Tuning, duration_s: float) -> tuple[Array, Array]:

@@ -137,14 +137,21 @@ def limit_lines(limits: Sequence[Proposal]) -> list[str]:
     """Return a row for each limit with its reasoning below; none without limits."""
     if not limits:
         return []
-    rows = ["", _row("Limits", "proposed, and what is configured")]
+    rows = ["", _row("Limits", "configured, and proposed where that differs")]
     for limit in limits:
-        now = "left out" if limit.now is None else f"{limit.now:g}"
-        value = "leave out" if limit.value is None else f"{limit.value:g}"
-        fits = f"{now} fits" if value in (now, "leave out") else f"{now} fits, {value} would do"
-        rows.append(_row(limit.key, f"{value}, got {now}" if limit.change else fits))
+        rows.append(_row(limit.key, _limit_words(limit)))
         rows += textwrap.wrap(limit.why, _LINE, initial_indent=_DEEP, subsequent_indent=_DEEP)
     return rows
+
+
+def _limit_words(limit: Proposal) -> str:
+    """Return what is configured and, where that differs, what is proposed."""
+    now, value = ("left out" if each is None else f"{each:g}" for each in (limit.now, limit.value))
+    if limit.change:
+        return f"configured: {now}, proposed: {value}"
+    if value in (now, "left out"):
+        return f"configured: {now}, which fits"
+    return f"configured: {now}, which fits; proposed: {value} would do"
 
 
 def limits_json(limits: Sequence[Proposal]) -> list[dict[str, Any]]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from thermoctl.studies import figure as house
 from thermoctl.studies.compare.figure import draw_comparison
 from thermoctl.studies.compare.goals import GOALS, STATISTICS
 from thermoctl.studies.compare.plants import FLEETS
@@ -185,6 +186,41 @@ def test_a_figure_is_drawn_whatever_was_never_reached(tmp_path):
     lines = summarise(found, ["law", "other", "absent"])
     assert draw_comparison(lines, ["law", "other", "absent"], files) == files
     assert all(file.stat().st_size > 1000 for file in files)
+
+
+@pytest.fixture
+def page(monkeypatch):
+    """Return a function that draws a comparison and returns its notes and the dashes of goals."""
+
+    def draw(lines, controllers):
+        kept = []
+
+        def keep(figure, path):
+            kept.append([text.get_text() for text in figure.texts])
+            dashes = [line._unscaled_dash_pattern for line in figure.axes[0].get_lines()]
+            kept.append({tuple(pattern) for _, pattern in dashes if pattern is not None})
+            return path
+
+        monkeypatch.setattr(house, "save", keep)
+        draw_comparison(lines, controllers, ["unused.png"])
+        return kept
+
+    return draw
+
+
+def test_a_figure_says_what_its_marks_and_names_mean(page):
+    notes, dashes = page(summarise(results([110.0, 120.0]), ["law"]), ["law"])
+    assert "dotted: goal of the median or mean; dashed: goal of the 95 %" in notes
+    assert any(note.startswith("solid, at 1: the bound") for note in notes)
+    assert f"rig: {FLEETS['rig'].text}" in notes
+    assert dashes == {(1, 1), (4, 2)}
+
+
+def test_a_figure_names_the_controllers_that_it_has_no_room_for(page):
+    names = ["law", "b", "c", "d", "on-off"]
+    found = [each for name in names for each in results([110.0], controller=name)]
+    notes, _ = page(summarise(found, names), names)
+    assert "not drawn, and in the table: on-off" in notes
 
 
 def test_a_figure_has_a_letter_for_each_of_four_units(tmp_path):

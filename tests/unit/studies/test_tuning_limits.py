@@ -14,7 +14,7 @@ from thermoctl.studies.plant_words import Bounded
 from thermoctl.studies.record import Columns, Record
 from thermoctl.studies.tuning import tune
 from thermoctl.studies.tuning_figure import draw_tuning
-from thermoctl.studies.tuning_limits import RUNAWAY_K, InForce, proposed
+from thermoctl.studies.tuning_limits import RUNAWAY_K, InForce, Proposal, proposed
 from thermoctl.studies.tuning_words import limit_lines, limits_json
 
 NOW = InForce(setpoint_c=37.5, highest_setpoint_c=60.0, trip_above_c=60.0, power_max=1.0)
@@ -139,8 +139,19 @@ def test_every_limit_is_told_with_its_reasoning(plant):
     for each in limits:
         assert each.key in text
         assert " ".join(each.why.split()) in text
-    assert re.search(r"trip_above_c 40\.?\d*, got 60 ", text)
+    assert re.search(r"trip_above_c configured: 60, proposed: 40\.?\d* ", text)
     assert [each["key"] for each in limits_json(limits)] == [each.key for each in limits]
+
+
+def test_a_limit_says_what_is_configured_and_what_is_proposed():
+    def told(now, value, *, change=False):
+        return limit_lines([Proposal("jump_k", value, now, change, "why")])[2].split(maxsplit=1)[1]
+
+    assert told(60.0, 58.0) == "configured: 60, which fits; proposed: 58 would do"
+    assert told(60.0, 58.0, change=True) == "configured: 60, proposed: 58"
+    assert told(60.0, None, change=True) == "configured: 60, proposed: left out"
+    assert told(None, None) == "configured: left out, which fits"
+    assert told(1.0, 1.0) == "configured: 1, which fits"
 
 
 def test_the_page_holds_the_limits_below_its_panels(plant, monkeypatch):

@@ -63,7 +63,11 @@ def drawn(monkeypatch):
 
     def keep(figure, path):
         lines = [[line.get_xydata() for line in panel.get_lines()] for panel in figure.axes]
-        kept.extend((lines, [text.get_text() for text in figure.texts]))
+        words = [
+            [text.get_text() for text in (*panel.texts, panel.title, panel._right_title)]
+            for panel in figure.axes
+        ]
+        kept.extend((lines, [text.get_text() for text in figure.texts], words))
         return path
 
     def draw(tuning):
@@ -80,9 +84,18 @@ def test_the_answer_that_is_drawn_ends_on_gain_and_lag(tuning, drawn):
     assert model[-1] == pytest.approx(words[-1], rel=0.1)
 
 
+def test_every_line_of_the_page_has_a_name(tuning, drawn):
+    weighed = tune(tuning.record, [Order(1, 1, DELAY), Order(2, 1, DELAY)], 37.5)
+    _, _, (_, power, orders, answer) = drawn(weighed)
+    assert "taken" in power
+    assert any("as the board took it: accepted_power in run.csv" in each for each in power)
+    assert "settled: 95 %" in orders
+    assert any(each.startswith("solid: model · dashed: gain ") for each in answer)
+
+
 def test_of_a_plant_that_was_not_heard_no_answer_is_drawn_and_it_says_why(tuning, drawn):
     heard = len(drawn(tuning)[0])
-    panels, below = drawn(replace(tuning, words=None))
+    panels, below, _ = drawn(replace(tuning, words=None))
     assert len(panels) == heard - 1
     assert all(panels)
     assert "the power moved too little" in below[0]

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from thermoctl.studies import figure as house
+from thermoctl.studies.compare.plants import FLEETS
 from thermoctl.studies.compare.score import MEASURES
 from thermoctl.studies.compare.summary import Line, Score
 
@@ -17,9 +18,10 @@ MOST_DRAWN = len(house.HUES)
 MARKERS = ("o", "s", "D", "^")
 
 _ROW_IN, _MARGIN_IN, _GAP_IN = 0.30, 0.62, 0.62
-_NAME_IN = 0.14
+_NAME_IN, _NOTE_IN = 0.14, 0.14
 _LEFT, _BESIDE = 0.02, 0.17
-_GOAL: Any = {"color": house.MUTE, "linewidth": 0.8, "dashes": (1, 1)}
+_GOAL: Any = {"color": house.MUTE, "linewidth": 0.8}
+_MIDDLING, _DOTTED, _DASHED = ("median", "mean"), (1, 1), (4, 2)
 _RATIOS, _KELVIN, _SECONDS, _TRAVEL = "times the bound", "K", "s", "full ranges a minute"
 _UNITS = {"settled_s": _SECONDS, "travel_per_min": _TRAVEL}
 
@@ -51,14 +53,16 @@ def draw_comparison(
     panels = _panels(lines)
     rows = [len(own) for _, own in panels]
     gaps_in = _GAP_IN * (len(rows) - 1)
-    height_in = _ROW_IN * sum(rows) + gaps_in + 2.0 * _MARGIN_IN + _NAME_IN * len(drawn)
+    notes = _notes(lines, controllers)
+    bottom_in = _MARGIN_IN + _NOTE_IN * (len(notes) - 1)
+    top_in = _MARGIN_IN + _NAME_IN * len(drawn)
+    height_in = _ROW_IN * sum(rows) + gaps_in + top_in + bottom_in
     with house.styled(house.WIDE_IN, height_in, len(panels), 1, height_ratios=rows) as (page, axes):
-        top_in = _MARGIN_IN + _NAME_IN * len(drawn)
         page.subplots_adjust(
             left=0.30,
             right=0.965,
             top=1.0 - top_in / height_in,
-            bottom=_MARGIN_IN / height_in,
+            bottom=bottom_in / height_in,
             hspace=_GAP_IN / (_ROW_IN * sum(rows) / len(rows)),
         )
         for index, (unit, own) in enumerate(panels):
@@ -66,6 +70,9 @@ def draw_comparison(
             _draw_panel(panel, own, drawn, unit)
             house.letter(panel, "abcd"[index])
         _write_head(page, lines, drawn, height_in)
+        for place, note in enumerate(reversed(notes)):
+            y = (0.17 + _NOTE_IN * place) / height_in
+            page.text(_LEFT, y, note, fontsize=7.5, va="center", color=house.MUTE)
         return [house.save(page, path) for path in paths]
 
 
@@ -96,7 +103,8 @@ def _draw_panel(panel: Any, lines: Sequence[Line], drawn: Sequence[str], unit: s
     for row, line in enumerate(lines):
         panel.axhline(row + 0.5, color=house.ALLOWED, linewidth=0.4, zorder=0)
         for goal in line.goals:
-            panel.plot([goal.at_most] * 2, [row - 0.45, row + 0.45], **_GOAL)
+            dashes = _DOTTED if goal.statistic in _MIDDLING else _DASHED
+            panel.plot([goal.at_most] * 2, [row - 0.45, row + 0.45], dashes=dashes, **_GOAL)
         for place, name in enumerate(drawn):
             if name in line.scores:
                 offset = _BESIDE * (place - 0.5 * (len(drawn) - 1))
@@ -146,12 +154,34 @@ def _row_name(line: Line) -> str:
     return f"{fleet}{line.scenario}: {MEASURES[line.measure].heading}{bound}"
 
 
+def _notes(lines: Sequence[Line], controllers: Sequence[str]) -> list[str]:
+    """Return what marks and names mean, and who is not drawn, a line each."""
+    notes = ["point: median of the plants; line: to their 95 %; arrow at the right edge: never"]
+    statistics = {goal.statistic for line in lines for goal in line.goals}
+    goals = {
+        "dotted: goal of the median or mean": any(each in _MIDDLING for each in statistics),
+        "dashed: goal of the 95 %": any(each not in _MIDDLING for each in statistics),
+    }
+    if any(goals.values()):
+        notes.append("; ".join(text for text, there in goals.items() if there))
+    if any(line.in_bounds for line in lines):
+        notes.append("solid, at 1: the bound, computed for each plant; in brackets: their median")
+    notes += [f"{name}: {FLEETS[name].text}" for name in _runs(lines) if name in FLEETS]
+    if left := controllers[MOST_DRAWN:]:
+        notes.append(f"not drawn, and in the table: {', '.join(left)}")
+    return notes
+
+
+def _runs(lines: Sequence[Line]) -> dict[str, int]:
+    """Return how many plants of each fleet there are."""
+    return {line.fleet: max(score.runs for score in line.scores.values()) for line in lines}
+
+
 def _write_head(page: Any, lines: Sequence[Line], drawn: Sequence[str], height_in: float) -> None:
-    """Write the title, the name of every controller beside its mark, and what is drawn."""
+    """Write the title, and the name of every controller beside its mark."""
     from matplotlib.lines import Line2D
 
-    runs = {line.fleet: max(score.runs for score in line.scores.values()) for line in lines}
-    fleets = ", ".join(f"{count} × {fleet}" for fleet, count in runs.items())
+    fleets = ", ".join(f"{count} × {fleet}" for fleet, count in _runs(lines).items())
     title = f"Controllers on the same plants: {fleets}"
     words: Any = {"va": "center", "color": house.INK}
     page.text(_LEFT, 1.0 - 0.17 / height_in, title, fontsize=9, fontweight="bold", **words)
@@ -161,8 +191,3 @@ def _write_head(page: Any, lines: Sequence[Line], drawn: Sequence[str], height_i
         ends = ([_LEFT + 0.002, _LEFT + 0.025], [y, y])
         page.add_artist(Line2D(*ends, linewidth=1.1, transform=page.transFigure, **mark))
         page.text(_LEFT + 0.035, y, name, fontsize=7.5, va="center", color=hue)
-    note = (
-        "point: median of the plants, line: to their 95 %, at the right edge: never;"
-        " dotted: goals; in brackets: the bound"
-    )
-    page.text(_LEFT, 0.17 / height_in, note, fontsize=7.5, va="center", color=house.MUTE)
