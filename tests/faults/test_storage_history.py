@@ -26,6 +26,8 @@ from thermoctl.signals import (
     Step,
 )
 
+pytestmark = pytest.mark.usefixtures("histories_closed")
+
 RUN = RunInfo("1.0", '{"loops": {}}')
 BELIEF = Estimate(np.zeros(2), np.eye(2))
 

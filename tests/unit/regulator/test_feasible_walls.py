@@ -80,7 +80,7 @@ def test_without_readings_nothing_is_told_and_no_alarm_comes_or_goes():
     assert math.isfinite(bench.feasibility.known.holding_power)
     told = bench.run(1800, seen=False)
     assert math.isfinite(told[3].holding_power)
-    assert set(told[8:]) == {Feasible()}
+    assert {repr(each) for each in told[8:]} == {repr(Feasible())}  # NaN equals nothing
     bench.run(1800, setpoint_c=400.0, seen=False)
     assert bench.events == []
     assert math.isfinite(bench.run(60)[-1].holding_power)
@@ -92,7 +92,7 @@ def test_what_cannot_be_reckoned_with_is_forgotten_and_said_once():
     for _ in range(2):
         bench.feasibility.fail(Failure("expected a result, got OverflowError", "where"))
     assert bench.feasibility.belief is None
-    assert bench.feasibility.known == Feasible()
+    assert repr(bench.feasibility.known) == repr(Feasible())  # NaN equals nothing
     assert [name for name, _ in bench.events] == ["balance.failed"]
 
 

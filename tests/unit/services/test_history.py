@@ -30,6 +30,8 @@ from thermoctl.services.history import (
 from thermoctl.services.history.schema import SCHEMA_VERSION, row_of
 from thermoctl.signals import Alarm, Event
 
+pytestmark = pytest.mark.usefixtures("histories_closed")
+
 RUN = RunInfo("1.2.3", '{"loops": {"tank": {"setpoint_c": 41.0}}}', started_utc_s=1.7e9)
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 START = datetime.fromtimestamp(1.7e9, UTC)

@@ -16,6 +16,8 @@ from thermoctl.services.history import HistoryWriter, RunInfo, export, open_hist
 from thermoctl.services.history.schema import SCHEMA_VERSION
 from thermoctl.signals import Beliefs
 
+pytestmark = pytest.mark.usefixtures("histories_closed")
+
 FIRST_SCHEMA = """
 CREATE TABLE runs (
     id INTEGER PRIMARY KEY,

@@ -9,6 +9,8 @@ from thermoctl.signals import Command, Cycle, Estimate, Measurement, Mode, State
 from thermoctl.studies.history_record import is_history, read_history_record
 from thermoctl.studies.record import Columns, RecordError
 
+pytestmark = pytest.mark.usefixtures("histories_closed")
+
 
 def cycle(t_s, loop="tank", temperature_c=None, accepted=None):
     temperature_c = 25.0 + 0.01 * t_s if temperature_c is None else temperature_c
