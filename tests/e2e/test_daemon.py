@@ -97,7 +97,7 @@ def test_a_latch_survives_kill_and_restart_and_only_ack_clears_it(start):
     [
         ("[loops.tank\n", r"bad\.toml:1"),
         ("[loops.tank]\nsetpont_c = 3.0\ntrip_above_c = 60\n", r"bad\.toml:2.*setpoint_c"),
-        ("[loops.tank]\nsetpoint_c = 70.0\ntrip_above_c = 60.0\n", r"bad\.toml:1.*70.*60"),
+        ("[loops.tank]\nsetpoint_c = 70.0\ntrip_above_c = 60.0\n", r"bad\.toml:2.*60.*got 70"),
         ("", "loops"),
     ],
 )

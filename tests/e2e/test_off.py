@@ -28,7 +28,7 @@ def off(tmp_path, monkeypatch):
 def test_every_board_is_told_power_0(off):
     result = off(CONFIG / "aquarium.toml")
     assert result.return_value == 0
-    assert result.stdout.startswith("daq : power 0, simulated")
+    assert result.stdout.startswith("daq: power 0, simulated")
 
 
 def test_a_board_that_is_not_there_is_told_of_and_is_no_success(off, tmp_path):
