@@ -110,7 +110,8 @@ def new(out: Path | None, force: bool, yes: bool, **given: Any) -> None:
     """Ask a few questions and write a commented configuration."""
     if out is not None and out.exists() and not force:
         raise Refused(_TAKEN.format(out))
-    text = commented(_answers(_Interview(given, yes)))
+    answers = _answers(_Interview(given, yes))
+    text = commented(answers)
     for warning in _checked(text):
         click.echo(f"thermoctl: {warning}", err=True)
     if out is None:
@@ -118,6 +119,8 @@ def new(out: Path | None, force: bool, yes: bool, **given: Any) -> None:
         return
     _write(out, text, force)
     click.echo(f"{out} written; try it with: thermoctl --sim -c {out}", err=True)
+    if answers.mode == "off":
+        click.echo("once it runs, its loop is off until: thermoctl mode auto", err=True)
 
 
 class _Interview:

@@ -353,6 +353,13 @@ def test_a_real_board_starts_off_and_does_not_go_on_after_a_restart(run):
     assert (code, loop.mode, loop.resume) == (0, "off", False)
 
 
+@pytest.mark.parametrize(("mode", "told"), [("off", True), ("auto", False)])
+def test_who_begins_with_a_loop_that_is_off_is_told_how_to_switch_it_on(run, tmp_path, mode, told):
+    path = tmp_path / "new.toml"
+    _, _, err = run("config", "new", "--yes", "--mode", mode, "-o", path)
+    assert ("thermoctl mode auto" in err) is told
+
+
 def test_a_real_board_goes_on_by_itself_where_that_was_asked_for(run):
     asked = ("--mode", "auto", "--resume")
     code, out, _ = run("config", "new", "--yes", "--kind", "thermodaq", *KNOWN, *asked)
