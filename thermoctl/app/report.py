@@ -97,8 +97,8 @@ class Summary:
             "steps": self._steps,
             "missed": last.missed if last else 0,
             "overshoot_k": round(self._overshoot_k, 4),
-            "reached_s": self._reached_s,
-            "settled_s": self._settled_s(last.step.t_s) if last else None,
+            "settled_s": self._reached_s,
+            "settled_for_good_s": self._settled_s(last.step.t_s) if last else None,
             "deviation_mk": round(1e3 * math.sqrt(self._squares / self._counted), 2)
             if reached
             else None,
@@ -157,7 +157,7 @@ def closing_lines(figures: Mapping[str, Any]) -> list[str]:
 
 def _settled(figures: Mapping[str, Any]) -> str:
     """Return when the set point in force was reached, and from when on it was kept."""
-    settled_s, reached_s = figures["settled_s"], figures["reached_s"]
+    reached_s, settled_s = figures["settled_s"], figures["settled_for_good_s"]
     if reached_s is None:
         return f"never: not within ±{SETTLED_K:g} K of the set point for {SETTLED_FOR_S:g} s"
     settled = "never" if settled_s is None else f"after {duration(settled_s)}"

@@ -16,8 +16,8 @@ HELD = {
     "steps": 3601,
     "missed": 0,
     "overshoot_k": 0.1234,
-    "reached_s": 412.0,
     "settled_s": 412.0,
+    "settled_for_good_s": 412.0,
     "deviation_mk": 8.31,
     "max_deviation_mk": 25.7,
     "travel_per_min": 0.4111,
@@ -42,19 +42,20 @@ def test_a_run_that_held_is_told_in_four_lines_with_units():
 
 
 def test_a_run_that_did_not_settle_says_so_and_judges_nothing():
-    lines = told(settled_s=None, reached_s=None, deviation_mk=None, max_deviation_mk=None)
+    nothing = dict.fromkeys(("deviation_mk", "max_deviation_mk"))
+    lines = told(settled_for_good_s=None, settled_s=None, **nothing)
     assert lines[1].startswith("Settled   never: not within ±0.1 K of the set point for 60 s")
     assert lines[2] == "Held      not judged before it was reached"
 
 
 def test_a_run_that_reached_its_set_point_and_left_it_did_not_settle():
     line = "Settled   never; first there after 6 min 52 s, overshoot 0.12 K"
-    assert told(settled_s=None)[1] == line
+    assert told(settled_for_good_s=None)[1] == line
 
 
 def test_a_run_that_came_back_says_when_it_was_there_first():
     line = "Settled   after 10 min; first there after 6 min 52 s, overshoot 0.12 K"
-    assert told(settled_s=600.0)[1] == line
+    assert told(settled_for_good_s=600.0)[1] == line
 
 
 def test_a_loop_that_is_latched_has_a_line_of_its_own():
@@ -88,13 +89,13 @@ def figures_of(deviations_k):
 def test_what_leaves_the_band_again_was_reached_and_has_not_settled():
     swings = [-0.05] * 200 + [0.3] * 10 + [-0.05] * 30
     figures = figures_of([-1.0] * 100 + swings)
-    assert (figures["reached_s"], figures["settled_s"]) == (100.0, None)
+    assert (figures["settled_s"], figures["settled_for_good_s"]) == (100.0, None)
     assert figures["max_deviation_mk"] == 300.0
 
 
 def test_what_comes_back_to_stay_has_settled_there():
     figures = figures_of([-1.0] * 100 + [0.05] * 100 + [0.3] * 10 + [0.05] * 90)
-    assert (figures["reached_s"], figures["settled_s"]) == (100.0, 210.0)
+    assert (figures["settled_s"], figures["settled_for_good_s"]) == (100.0, 210.0)
 
 
 def test_the_summary_says_how_every_loop_ended():
@@ -137,12 +138,12 @@ def test_what_is_not_known_is_a_dash(unknown):
 
 def test_no_line_is_wider_than_a_terminal():
     wide = told(
+        settled_for_good_s=None,
         settled_s=None,
-        reached_s=None,
         overshoot_k=35.0,
         missed=1_000_000,
         duration_s=9e7,
         steps=9e7,
     )
     assert max(map(len, wide)) <= 80
-    assert max(map(len, told(settled_s=86_399.0, overshoot_k=35.0))) <= 80
+    assert max(map(len, told(settled_for_good_s=86_399.0, overshoot_k=35.0))) <= 80
