@@ -201,6 +201,7 @@ def test_a_locked_file_costs_the_publisher_nothing_and_loses_no_cycle(tmp_path):
     assert writer.health().counters["dropped"] == 0
 
 
+@pytest.mark.slow
 def test_a_lock_held_for_long_drops_the_oldest_counts_and_says_so_once(tmp_path):
     path = tmp_path / "history.sqlite"
     record(path, 0, 1)

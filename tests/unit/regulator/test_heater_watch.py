@@ -127,6 +127,7 @@ def test_a_heater_that_was_never_known_has_a_minute_of_full_power(does, code):
     assert plant.names()[-1] == code
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise_k", [0.0, 0.3])
 def test_a_reading_that_never_answers_ends_the_heat_after_a_quarter_of_an_hour(noise_k):
     plant, given = Plant(noise_k=noise_k), deque([0.0], maxlen=1)
@@ -142,6 +143,7 @@ def test_a_reading_that_never_answers_ends_the_heat_after_a_quarter_of_an_hour(n
     assert given[0] < 960.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gain", "noise_k"), [(2e-3, 0.3), (3e-4, 0.05)])
 def test_a_weak_heater_in_noise_is_given_its_time(gain, noise_k):
     for seed in range(2):
@@ -155,6 +157,7 @@ def test_a_heater_at_its_limit_is_asked_once_and_goes_on():
     assert plant.applied == 1.0
 
 
+@pytest.mark.slow
 def test_fifty_watts_in_two_hundred_litres_are_a_heater():
     plant = Plant(gain=6e-5, loss=0.0, lag_s=20.0).run(4 * 3600, 1.0)
     assert set(plant.names()) <= {"heater.questioned", "heater.answered"}

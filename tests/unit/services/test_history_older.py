@@ -135,6 +135,7 @@ def test_a_file_is_brought_up_to_date_once_and_opens_again(older):
             assert connection.execute("SELECT count(*) FROM cycles").fetchone() == (2,)
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_be_brought_up_to_date_now_stays_as_it_was(older):
     with closing(sqlite3.connect(older)) as other:
         other.execute("PRAGMA journal_mode = WAL")

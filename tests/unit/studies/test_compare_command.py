@@ -134,6 +134,7 @@ def ended(capsys, monkeypatch):
     return ended
 
 
+@pytest.mark.slow
 def test_a_check_ends_with_1_when_the_first_controller_misses_a_goal(tmp_path, ended):
     arguments = ["--controller", "on-off", *BRIEF, "--out", tmp_path]
     code, _, said = ended(*arguments, "--check")
@@ -146,12 +147,14 @@ def test_a_check_ends_with_1_when_the_first_controller_misses_a_goal(tmp_path, e
     assert ended(*arguments)[0] == 0  # a comparison that could be made
 
 
+@pytest.mark.slow
 def test_a_check_asks_nothing_of_the_others(tmp_path, ended):
     both = ["--controller", "adaptive", "--controller", "on-off", *BRIEF, "--out", tmp_path]
     code, _, said = ended(*both, "--check")
     assert (code, "misses" in said) == (0, False)
 
 
+@pytest.mark.slow
 def test_json_is_one_object_and_the_second_time_nothing_is_run(tmp_path):
     arguments = ["--controller", "on-off", *BRIEF, "--out", tmp_path, "--json"]
     first, second = run(*arguments), run(*arguments)
@@ -162,6 +165,7 @@ def test_json_is_one_object_and_the_second_time_nothing_is_run(tmp_path):
     assert len((tmp_path / RESULTS).read_text().splitlines()) == 2
 
 
+@pytest.mark.slow
 def test_another_first_seed_is_another_plant(tmp_path):
     arguments = ["--controller", "on-off", *BRIEF, "--out", tmp_path, "--json"]
     usual = json.loads(run(*arguments).stdout)
@@ -172,6 +176,7 @@ def test_another_first_seed_is_another_plant(tmp_path):
     assert {row["seed"] for row in rows} == {0, 300}
 
 
+@pytest.mark.slow
 def test_a_run_on_a_lab_is_kept_with_its_bound_and_not_made_twice(tmp_path):
     arguments = ["--controller", "marlin-mpc", "--fleet", "tclab", *BRIEF, "--out", tmp_path]
     first, second = run(*arguments, "--json"), run(*arguments, "--json")
