@@ -249,7 +249,7 @@ class Alarm:
     code : str
         Stable name, such as ``sensor.open``; listed in docs/events.md.
     fault : int or None
-        Row of the fault table it belongs to.
+        Number of its kind of fault, as listed in docs/events.md; None: it has none.
     priority : int
         1 acts now (SAFE, LATCHED), 2 warns, 3 informs.
     since_s : float

@@ -258,7 +258,7 @@ class Pairing:
         return self._t_s, interval_s if 0.0 < interval_s < math.inf else period_s
 
     def _doubts(self, first: Measurement, second: Measurement) -> Iterator[tuple[str, int, str]]:
-        """Yield code, row of the fault table and text of every alarm; no text: it is over."""
+        """Yield code, fault number and text of every alarm; no text: it is over."""
         pair, both = self.pair, (first, second)
         for which, trace in enumerate((pair.first, pair.second)):
             seen, other = both[which], both[1 - which]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from itertools import pairwise
 from pathlib import Path
 
 from thermoctl.services.events import EVENTS, PRIORITIES, REASONS, level_of
@@ -75,6 +76,40 @@ def test_the_page_lists_every_reason():
     page = (ROOT / "docs" / "events.md").read_text(encoding="utf-8")
     _, reasons = page.split("## Reasons")
     assert set(re.findall(r"^\| `([a-z._]+)` \|", reasons, re.MULTILINE)) == REASONS
+
+
+def numbered(source: str) -> set[tuple[str, int]]:
+    """Return the codes that are followed by a number, in calls, tuples and mappings."""
+    pairs = set()
+    for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.Call(args=nodes) | ast.Tuple(elts=nodes):
+                pairs |= set(pairwise(nodes))
+            case ast.Dict(keys=keys, values=values):
+                pairs |= set(zip(keys, values, strict=True))
+    constants = {
+        (each[0].value, each[1].value)
+        for each in pairs
+        if all(isinstance(one, ast.Constant) for one in each)
+    }
+    return {(c, n) for c, n in constants if c in EVENTS and type(n) is int}
+
+
+def test_the_page_lists_every_fault_number():
+    page = (ROOT / "docs" / "events.md").read_text(encoding="utf-8")
+    table = page.split("## Fault numbers")[1].split("## Reasons")[0]
+    rows = re.findall(r"^\| (\d+) \| [^|]+ \| (.+) \|$", table, re.MULTILINE)
+    told = {(code, int(n)) for n, codes in rows for code in re.findall(r"`([a-z._]+)`", codes)}
+    rooms = [ROOT / "thermoctl" / room for room in ("regulator", "runtime")]
+    given = {
+        pair
+        for room in rooms
+        for path in room.rglob("*.py")
+        for pair in numbered(path.read_text(encoding="utf-8"))
+    }
+    assert {("board.lost", 13), ("heater.reversed", 3), ("sensor.open", 1)} <= given
+    assert given <= told
+    assert {code for code, _ in told} <= set(EVENTS)
 
 
 def test_an_unknown_name_is_a_warning():
