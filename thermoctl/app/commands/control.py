@@ -82,7 +82,7 @@ def _mode(text: str) -> str:
 def _rate(text: str) -> float:
     """Return a rate in K/min, written ``2/min``, ``2K/min`` or ``30/h``; else ``ValueError``."""
     match = re.fullmatch(
-        r"\s*((?:\d+(?:\.\d*)?|\.\d+)(?:e\+?\d+)?)\s*(?:K|°C|degC)?\s*/\s*(min|h)\s*", text
+        r"\s*((?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*(?:K|°C|degC)?\s*/\s*(min|h)\s*", text
     )
     rate_k_per_min = math.nan if match is None else float(match[1]) / _MINUTES[match[2]]
     if not 0.0 < rate_k_per_min < math.inf:

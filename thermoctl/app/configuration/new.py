@@ -76,7 +76,8 @@ class Answers:
     def setpoint_max_c(self) -> float:
         """Highest set point: a tenth of the way back from the trip, but with headroom."""
         room_k = max(0.1 * (self.trip_above_c - self.setpoint_c), HEADROOM_K)
-        return max(round(self.trip_above_c - room_k, 2), self.setpoint_c)
+        downwards = math.floor(100.0 * (self.trip_above_c - room_k) + 1e-6) / 100.0
+        return max(downwards, self.setpoint_c)
 
 
 @click.command(

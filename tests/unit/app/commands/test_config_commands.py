@@ -420,7 +420,7 @@ def test_a_set_point_that_was_answered_next_to_the_trip_is_told(run):
     assert load(tomllib.loads(out)).loops["tank"].setpoint_c == 50.0
 
 
-@pytest.mark.parametrize("trip_c", [52, 55, 60, 70])
+@pytest.mark.parametrize("trip_c", [52, 55.005, 60, 70])
 def test_the_highest_set_point_that_is_written_has_room_for_an_overshoot(run, trip_c):
     _, out, err = run("config", "new", "--yes", "--setpoint-c", 50, "--trip-above-c", trip_c)
     assert err == ""

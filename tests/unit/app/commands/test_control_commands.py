@@ -26,7 +26,8 @@ def test_a_set_point_in_another_unit_that_is_refused_is_told_in_both(
 
 
 @pytest.mark.parametrize(
-    ("typed", "k_per_min"), [("2/min", 2.0), ("30K/h", 0.5), ("1e2/min", 100.0), (".5/min", 0.5)]
+    ("typed", "k_per_min"),
+    [("2/min", 2.0), ("30K/h", 0.5), ("1E2/min", 100.0), (".5/min", 0.5), ("5e-1K/min", 0.5)],
 )
 def test_a_rate_may_be_written_as_any_number(typed, k_per_min):
     assert control._rate(typed) == pytest.approx(k_per_min)
