@@ -14,6 +14,8 @@ from thermoctl.studies.words import duration
 
 SETTLED_K = 0.1
 SETTLED_FOR_S = 60.0
+_UNSEEN_MAX = 5
+"""Readings in a row that may be missing, before nobody can say that the temperature stayed."""
 
 
 class Summary:
@@ -22,7 +24,7 @@ class Summary:
     Judged on the true temperature where a simulation knows it. The set point is reached at the
     first moment from which the temperature stays within 0.1 K of it for a minute; deviations count
     from there on. The loop has settled at the one from which it stays there to the end of the run,
-    a minute at least. A new set point begins anew.
+    a minute at least, and is seen to: where readings stop it has not. A new set point begins anew.
     """
 
     def __init__(self) -> None:
@@ -41,6 +43,9 @@ class Summary:
         self._rising: bool | None = None
         self._overshoot_k = 0.0
         self._within_since_s: float | None = None
+        self._stays_since_s: float | None = None
+        self._seen_s = t_s
+        self._unseen = 0
         self._reached_s: float | None = None
         self._squares = self._largest_k = 0.0
         self._counted = 0
@@ -64,26 +69,31 @@ class Summary:
         if math.isfinite(temperature_c):
             self._temperature_c = temperature_c
             self._judge(temperature_c - step.setpoint_c, step.t_s)
+            return
+        self._unseen += 1
+        if self._unseen > _UNSEEN_MAX:
+            self._stays_since_s = None
 
     def _judge(self, deviation_k: float, t_s: float) -> None:
+        self._seen_s, self._unseen = t_s, 0
         if self._rising is None:
             self._rising = deviation_k < 0.0
         self._overshoot_k = max(self._overshoot_k, deviation_k if self._rising else -deviation_k)
         if abs(deviation_k) > SETTLED_K:
-            self._within_since_s = None
-        elif self._within_since_s is None:
-            self._within_since_s = t_s
+            self._within_since_s = self._stays_since_s = None
+        else:
+            self._within_since_s = t_s if self._within_since_s is None else self._within_since_s
+            self._stays_since_s = t_s if self._stays_since_s is None else self._stays_since_s
         if self._reached_s is None:
-            self._reached_s = self._settled_s(t_s)
+            self._reached_s = self._settled_s(self._within_since_s)
             return
         self._squares += deviation_k**2
         self._largest_k = max(self._largest_k, abs(deviation_k))
         self._counted += 1
 
-    def _settled_s(self, t_s: float) -> float | None:
-        """Return how long after the set point was given it came to stay, seen from `t_s`."""
-        since_s = self._within_since_s
-        if since_s is None or t_s - since_s < SETTLED_FOR_S:
+    def _settled_s(self, since_s: float | None) -> float | None:
+        """Return how long after the set point was given it came to stay, if from `since_s` on."""
+        if since_s is None or self._seen_s - since_s < SETTLED_FOR_S:
             return None
         return since_s - self._start_s
 
@@ -98,7 +108,7 @@ class Summary:
             "missed": last.missed if last else 0,
             "overshoot_k": round(self._overshoot_k, 4),
             "settled_s": self._reached_s,
-            "settled_for_good_s": self._settled_s(last.step.t_s) if last else None,
+            "settled_for_good_s": self._settled_s(self._stays_since_s),
             "deviation_mk": round(1e3 * math.sqrt(self._squares / self._counted), 2)
             if reached
             else None,

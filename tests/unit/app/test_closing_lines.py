@@ -98,6 +98,37 @@ def test_what_comes_back_to_stay_has_settled_there():
     assert (figures["settled_s"], figures["settled_for_good_s"]) == (100.0, 210.0)
 
 
+BLIND = [math.nan] * 6
+HELD_K = [-1.0] * 100 + [0.05] * 100
+
+
+@pytest.mark.parametrize("unseen", [BLIND, BLIND * 100])
+def test_what_nobody_saw_to_the_end_has_been_reached_and_has_not_settled(unseen):
+    figures = figures_of(HELD_K + unseen)
+    assert (figures["settled_s"], figures["settled_for_good_s"]) == (100.0, None)
+
+
+def test_what_nobody_saw_for_a_while_has_settled_after_it():
+    figures = figures_of(HELD_K + BLIND + [0.05] * 90)
+    assert (figures["settled_s"], figures["settled_for_good_s"]) == (100.0, 206.0)
+
+
+@pytest.mark.parametrize("after", [[], [0.05] * 90])
+def test_a_few_readings_that_are_missing_do_not_undo_what_has_settled(after):
+    figures = figures_of(HELD_K + BLIND[1:] + after)
+    assert (figures["settled_s"], figures["settled_for_good_s"]) == (100.0, 100.0)
+
+
+def test_a_minute_that_was_not_seen_whole_settles_nothing():
+    figures = figures_of([-1.0] * 100 + [0.05] * 60 + BLIND[1:])
+    assert (figures["settled_s"], figures["settled_for_good_s"]) == (None, None)
+
+
+def test_readings_that_are_missing_do_not_change_when_the_set_point_was_reached():
+    figures = figures_of([-1.0] * 100 + [0.05] * 30 + BLIND * 5 + [0.05] * 5)
+    assert (figures["settled_s"], figures["settled_for_good_s"]) == (100.0, None)
+
+
 def test_the_summary_says_how_every_loop_ended():
     summary = Summary()
     summary.add(cycle(0.0, 0.0))
