@@ -122,7 +122,7 @@ def part_errors(table: LoopTable, *, whole: bool = True) -> Iterator[BadOption]:
             if whole or (len(path) > 1 and path[-1] != "action"):
                 yield error
         rest = without(content, path[:-1] if path[-1:] == ("kind",) else path) if path else content
-        left = repaired(LoopTable, rest, {})
+        left = repaired(rest)
         if rest == content or left is None:
             return
         content, table, whole = rest, left, False

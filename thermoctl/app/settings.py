@@ -22,27 +22,22 @@ from thermoctl.app.configuration.document import (
     Problem,
     read_document,
 )
-from thermoctl.app.configuration.repair import repaired, without_keys_beside
+from thermoctl.app.configuration.repair import (
+    repaired,
+    without_keys_beside_limits,
+    without_unknown_keys,
+)
 from thermoctl.app.configuration.tables import HistoryTable, LoopTable, ServiceTable, Table
 from thermoctl.app.configuration.wording import (
     reasons,
     shown,
     unknown_key,
     validated,
-    without_unknown_keys,
 )
 from thermoctl.app.parts import part_errors
 from thermoctl.errors import ConfigError
 
 ETC = Path("/etc/thermoctl")
-_STAND_INS = {
-    "setpoint_c": 20.0,
-    "trip_above_c": 100.0,
-    "trip_below_c": None,
-    "setpoint_min_c": None,
-    "setpoint_max_c": None,
-}
-"""Limits that contradict nothing, for a loop whose own do: its laws are tried out all the same."""
 _LOOP_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")  # it names files and topics too
 
 
@@ -176,7 +171,7 @@ class _Reading:
             if not _LOOP_NAME.fullmatch(name):
                 self._blame(("loops", name), "a loop is named with up to 64 of a-z, A-Z, 0-9, - _")
             whole = isinstance(loop, LoopTable)
-            judged = loop if whole else repaired(LoopTable, table, _STAND_INS)
+            judged = loop if whole else repaired(table)
             if isinstance(judged, LoopTable):
                 for error in part_errors(judged, whole=whole):
                     self._blame(("loops", name, *error.path), error.text)
@@ -221,7 +216,7 @@ class _Reading:
             self._explain(error, model, path)
             pruned = without_unknown_keys(error, table)
             if model is LoopTable:
-                pruned = without_keys_beside(_STAND_INS, error, pruned)
+                pruned = without_keys_beside_limits(error, pruned)
         if pruned != table:  # limits that contradict each other show only in a table without typos
             try:
                 validated(model, pruned)

@@ -278,6 +278,16 @@ def test_a_mistake_in_one_place_does_not_hide_those_in_others(minimal, keys, tol
     assert sorted(found) == sorted(f"loops.tank.{key}" for key in told)
 
 
+@pytest.mark.parametrize("place", [(), ("actuator",), ("model",)])
+def test_an_unknown_key_may_look_like_what_tells_tables_apart(minimal, place):
+    keys = {"<board>": 1}
+    for name in place:
+        keys = {name: keys}
+    minimal["boards"] = {"daq": {"kind": "simulated"}}
+    path = ".".join(("loops.tank", *place, "<board>"))
+    assert any(f" {path}: unknown key" in line for line in problems(tank(minimal, **keys)))
+
+
 @pytest.mark.parametrize(
     "keys",
     [

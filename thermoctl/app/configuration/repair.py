@@ -5,43 +5,37 @@ Nothing that is mended here is ever run: a document with a mistake is refused wh
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from typing import Any, Final, TypeVar
+from collections.abc import Mapping
+from typing import Any, Final
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
-from thermoctl.app.configuration.wording import validated
+from thermoctl.app.configuration.tables import LoopTable
+from thermoctl.app.configuration.wording import KeyPath, keys_to, validated
 
-Model = TypeVar("Model", bound=BaseModel)
-KeyPath = tuple[str, ...]
+LIMITS: Final[Mapping[str, float | None]] = {
+    "setpoint_c": 20.0,
+    "trip_above_c": 100.0,
+    "trip_below_c": None,
+    "setpoint_min_c": None,
+    "setpoint_max_c": None,
+}
+"""Limits that contradict nothing, for a loop whose own do: its laws are tried out all the same.
+All of them are taken where one is missing, bad or contradicts another; None leaves a key out."""
 
-_ROUNDS: Final = 8
-"""Removing a key may leave another one missing, or show a table that contradicts itself."""
 
-
-def repaired(model: type[Model], table: Any, stand_ins: Mapping[str, Any]) -> Model | None:
-    """Return `table` as a `model` without what is wrong in it, None if that fails.
-
-    Parameters
-    ----------
-    model : type
-        What the table should have been.
-    table : any
-        Its content as it was written.
-    stand_ins : mapping
-        By key, what is taken for all of them where one is missing, bad or contradicts another;
-        None leaves a key out.
-    """
-    for _ in range(_ROUNDS):
-        if not isinstance(table, Mapping):
-            return None
+def repaired(table: Any) -> LoopTable | None:
+    """Return the table of a loop without what is wrong in it, None if that fails."""
+    while isinstance(table, Mapping):
+        mended = table
         try:
-            whole = validated(model, table)
+            return validated(LoopTable, table)
         except ValidationError as error:
             for each in error.errors(include_url=False):
-                table = _mended(table, _path(each["loc"]), each["type"], stand_ins)
-        else:
-            return whole if isinstance(whole, model) else None
+                mended = _mended(mended, keys_to(each), each["type"])
+        if mended == table:
+            return None
+        table = mended
     return None
 
 
@@ -56,25 +50,26 @@ def without(table: Mapping[str, Any], path: KeyPath) -> Mapping[str, Any]:
     return {**table, key: without(inner, tuple(rest))}
 
 
-def without_keys_beside(limits: Collection[str], error: ValidationError, table: Any) -> Any:
-    """Return a copy of `table` without what `error` names, save those of `limits`."""
+def without_unknown_keys(error: ValidationError, table: Any) -> Any:
+    """Return a copy of `table` without the keys that `error` does not know."""
     for each in error.errors(include_url=False):
-        path = _path(each["loc"])
-        if path and path[0] not in limits and isinstance(table, Mapping):
-            table = _mended(table, path, each["type"], {})
+        if each["type"] == "extra_forbidden":
+            table = without(table, keys_to(each))
     return table
 
 
-def _path(loc: tuple[int | str, ...]) -> KeyPath:
-    """Return the keys of a place in a table, without the tags of what it may be."""
-    return tuple(str(part) for part in loc if str(part)[:1] != "<")
+def without_keys_beside_limits(error: ValidationError, table: Any) -> Any:
+    """Return a copy of a loop's table without what `error` names, save its limits."""
+    for each in error.errors(include_url=False):
+        path = keys_to(each)
+        if path and path[0] not in LIMITS:
+            table = _mended(table, path, each["type"])
+    return table
 
 
-def _mended(
-    table: Mapping[str, Any], path: KeyPath, kind: str, stand_ins: Mapping[str, Any]
-) -> Mapping[str, Any]:
+def _mended(table: Mapping[str, Any], path: KeyPath, kind: str) -> Mapping[str, Any]:
     """Return `table` without the key at `path`, or with what stands in for it."""
-    if not path or path[0] in stand_ins:
-        kept = {key: value for key, value in table.items() if key not in stand_ins}
-        return {**kept, **{key: each for key, each in stand_ins.items() if each is not None}}
+    if not path or path[0] in LIMITS:
+        kept = {key: value for key, value in table.items() if key not in LIMITS}
+        return {**kept, **{key: each for key, each in LIMITS.items() if each is not None}}
     return without(table, path[:-1] if kind == "missing" and len(path) > 1 else path)

@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
-from typing import Any, get_args, get_origin
+from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -15,12 +15,13 @@ from thermoctl.app.plugins import blamed, nearest
 from thermoctl.quantities import is_finite_number
 
 KeyPath = tuple[str, ...]
+Model = TypeVar("Model", bound=BaseModel)
 
 _LONGEST = 60
 _MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")
 """A member of an enumeration as Python shows it, and the word in it."""
 _TAG = re.compile(r"<\w+>")
-"""Which one of several tables was meant; not a key."""
+"""In the place of an error: which one of several tables was meant; not a key."""
 _EXPECTED = {
     "float_type": "a number",
     "float_parsing": "a number",
@@ -44,7 +45,7 @@ _EXPECTED = {
 }
 
 
-def validated(model: type[BaseModel], table: Any) -> BaseModel:
+def validated(model: type[Model], table: Any) -> Model:
     """Return `table` as a `model`; text is never taken for a number, nor 1 for true.
 
     The detour over JSON is what makes pydantic strict about numbers and yet take a list for a
@@ -66,7 +67,7 @@ def reasons(
     for each in error.errors(include_url=False):
         if only not in ("", each["type"]):
             continue
-        path = tuple(str(part) for part in each["loc"] if not _TAG.fullmatch(str(part)))
+        path = keys_to(each)
         if each["type"] == "value_error":  # of a whole table: its text begins with the key it means
             text = str(each["msg"]).removeprefix("Value error, ")
             written = each["input"] if isinstance(each["input"], Mapping) else ()
@@ -77,13 +78,12 @@ def reasons(
     return told
 
 
-def without_unknown_keys(error: ValidationError, table: Any) -> Any:
-    """Return a copy of `table` without the keys that `error` does not know."""
-    pruned = table
-    for each in error.errors(include_url=False):
-        if each["type"] == "extra_forbidden":
-            pruned = _without(pruned, tuple(each["loc"]))
-    return pruned
+def keys_to(error: Any) -> KeyPath:
+    """Return the keys that lead to the place of one of pydantic's errors in a table."""
+    place = tuple(map(str, error["loc"]))
+    unknown = place[-1:] if error["type"] == "extra_forbidden" else ()  # it may look like a tag
+    above = place[: len(place) - len(unknown)]
+    return (*(part for part in above if not _TAG.fullmatch(part)), *unknown)
 
 
 def unknown_key(key: str, known: Iterable[str], value: Any = None) -> str:
@@ -151,12 +151,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Integral):
         return int(value)
     return float(value) if isinstance(value, Real) else str(value)
-
-
-def _without(table: Any, path: tuple[int | str, ...]) -> Any:
-    if not path or not isinstance(table, Mapping):
-        return table
-    key, *rest = path
-    if not rest:
-        return {each: value for each, value in table.items() if each != key}
-    return {e: _without(v, tuple(rest)) if e == key else v for e, v in table.items()}
