@@ -23,6 +23,7 @@ from thermoctl.app.configuration.tables import (
     SensorTable,
 )
 from thermoctl.app.plugins import BadOption
+from thermoctl.app.reach import reach_errors
 from thermoctl.estimation import Guarded, Identifier, RandomWalkKalman
 from thermoctl.estimation.kalman import CorrectedKalman
 from thermoctl.model import actuator as laws
@@ -34,8 +35,6 @@ from thermoctl.regulator.heater.check import HeaterCheck, weakest_of
 
 HEAT, COOL, HEAT_COOL = "heat", "cool", "heat-cool"
 
-_ROOM_C, _ROOM_VOLTS = 25.0, ("lm335", "lm35", "tmp36")  # which are made to show that
-_HALVINGS = 50
 _ARX_EXCITATION_MIN = 0.1
 _ARX_GAIN_SHARE = 0.2
 """Guarded, a learnt gain is never taken for less than this share of the one that is given."""
@@ -97,13 +96,8 @@ def law_of_kind(table: LoopTable, kind: str) -> Controller:
 
 def check_parts(table: LoopTable) -> None:
     """Build every part of a loop once; raise `BadOption` where that fails."""
-    plan_for(table)
-    if table.sensor is not None:
-        _check_reach(table, sensor_for(table.sensor))
-    if table.second_sensor is not None:
-        _check_second(table, table.second_sensor)
-    for output in table.outputs:
-        law_for(output)
+    for error in part_errors(table):
+        raise error
 
 
 def part_errors(table: LoopTable, *, whole: bool = True) -> Iterator[BadOption]:
@@ -112,10 +106,12 @@ def part_errors(table: LoopTable, *, whole: bool = True) -> Iterator[BadOption]:
     What was refused is left out for the next attempt. What depends on several keys can then no
     longer be judged; nor can it where the table is not `whole` from the start.
     """
-    content: Mapping[str, Any] = table.model_dump(mode="json", exclude_unset=True)
+    if whole:
+        yield from _beyond_reach(table)
+    content: Mapping[str, Any] = table.model_dump(exclude_unset=True)
     while True:
         try:
-            check_parts(table)
+            _build(table)
             return
         except BadOption as error:
             path = error.path
@@ -126,6 +122,25 @@ def part_errors(table: LoopTable, *, whole: bool = True) -> Iterator[BadOption]:
         if rest == content or left is None:
             return
         content, table, whole = rest, left, False
+
+
+def _build(table: LoopTable) -> None:
+    """Build every part of a loop; raise `BadOption` of the first one that cannot be."""
+    plan_for(table)
+    if table.sensor is not None:
+        sensor_for(table.sensor)
+    if table.second_sensor is not None:
+        _check_second(table, table.second_sensor)
+    for output in table.outputs:
+        law_for(output)
+
+
+def _beyond_reach(table: LoopTable) -> Iterator[BadOption]:
+    """Yield each limit that a sensor of the loop cannot show; one that is bad is not asked."""
+    for part, sensor in (("sensor", table.sensor), ("second_sensor", table.second_sensor)):
+        if sensor is not None:
+            with contextlib.suppress(BadOption):
+                yield from reach_errors(table, part, sensor_for(sensor, part))
 
 
 def action_of(controller: Controller) -> str:
@@ -151,56 +166,15 @@ def _check_action(loop: LoopTable, name: str, law: Controller | None, charge: Co
         raise BadOption(f"expected {action_of(charge)!r} as in charge, got {action!r}", path)
 
 
-def _check_reach(table: LoopTable, sensor: curves.Sensor, part: str = "sensor") -> None:
-    """Refuse a trip or a set point that no reading could ever pass.
-
-    Beyond its ends a sensor counts as broken, so a trip out there would never act.
-    """
-    coldest_c, hottest_c = reach_c(sensor)
-    if not coldest_c < table.setpoint_c < hottest_c:
-        if getattr(table, part).curve in _ROOM_VOLTS and not coldest_c < _ROOM_C < hottest_c:
-            text = f"expected a converter that can show a room, got {sensor.reference_v:g} V"
-            raise BadOption(text, (part, "reference_v"))
-        text = f"expected what the sensor can show, {coldest_c:.1f} to {hottest_c:.1f} °C"
-        raise BadOption(f"{text}, got {table.setpoint_c:g}", ("setpoint_c",))
-    if not table.trip_above_c < hottest_c:
-        text = f"expected less than the {hottest_c:.1f} °C that the sensor can show at most"
-        raise BadOption(f"{text}, got {table.trip_above_c:g}", ("trip_above_c",))
-    if "trip_below_c" in table.model_fields_set and not table.trip_below_c > coldest_c:
-        text = f"expected more than the {coldest_c:.1f} °C that the sensor shows at least"
-        raise BadOption(f"{text}, got {table.trip_below_c:g}", ("trip_below_c",))
-
-
 def _check_second(table: LoopTable, second: SensorTable) -> None:
-    """Refuse a second sensor that is the first one again, or could not show a trip."""
+    """Refuse a second sensor that is none, or the first one again."""
     path, first = ("second_sensor",), table.sensor
     if first is None:
         raise BadOption("expected a table [loops.NAME.sensor] beside it, got none", path)
     if (second.board, second.input) == (first.board, first.input):
         text = f"expected another input than the first sensor's, got {second.input!r}"
         raise BadOption(f"{text} of {second.board!r} twice", (*path, "input"))
-    _check_reach(table, sensor_for(second, *path), *path)
-
-
-def reach_c(sensor: curves.Sensor) -> tuple[float, float]:
-    """Return the coldest and the hottest temperature that `sensor` can show, in degC."""
-    ends_c = [_last_shown_c(sensor, end) for end in (sensor.short_below, sensor.open_above)]
-    return min(ends_c), max(ends_c)
-
-
-def _last_shown_c(sensor: curves.Sensor, end: float) -> float:
-    """Return what is shown at fraction `end`, or where the curve stops on the way there."""
-    if math.isfinite(shown_c := sensor.temperature_c(end)):
-        return shown_c
-    room = sensor.fraction(_ROOM_C)  # on every curve, though not on every converter
-    shown, blind = min(max(room, sensor.short_below), sensor.open_above), end
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (shown + blind)
-        if math.isfinite(sensor.temperature_c(middle)):
-            shown = middle
-        else:
-            blind = middle
-    return sensor.temperature_c(shown)
+    sensor_for(second, *path)
 
 
 @contextlib.contextmanager

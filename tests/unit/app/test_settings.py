@@ -40,6 +40,10 @@ TABLES = {
     "service": ServiceTable,
 }
 KEYS = [(t, k) for t, model in TABLES.items() for k in model.model_fields if len(k) >= 4]
+ONE_SENSOR_TWICE = {
+    "sensor": {"board": "daq", "curve": "lm35"},
+    "second_sensor": {"board": "daq", "curve": "lm335"},
+}
 WHOLE = """\
 [boards.daq]
 kind = "simulated"
@@ -270,12 +274,25 @@ def test_limits_of_which_one_is_bad_are_not_judged_by_its_default(minimal):
             {"actuator": {"board": "daq", "law": "cube"}, "controller": "mpc"},
             ["actuator.law", "controller.kind"],
         ),
+        (
+            {"setpoint_c": -80.0, "trip_below_c": -90.0, "controller": "mpc", **ONE_SENSOR_TWICE},
+            ["setpoint_c", "trip_below_c", "controller.kind", "second_sensor.input"],
+        ),
+        (
+            {"trip_above_c": 300.0, "estimator": {"kind": "ckf", "R2": -1.0}, **ONE_SENSOR_TWICE},
+            ["trip_above_c", "estimator.R2", "second_sensor.input"],
+        ),
     ],
 )
 def test_a_mistake_in_one_place_does_not_hide_those_in_others(minimal, keys, told):
     minimal["boards"] = {"daq": {"kind": "simulated"}}
     found = [line.split(": ")[1] for line in problems(tank(minimal, **keys))]
     assert sorted(found) == sorted(f"loops.tank.{key}" for key in told)
+
+
+def test_an_option_behind_a_bad_one_is_shown_as_it_was_written(minimal):
+    lines = problems(tank(minimal, estimator={"kind": "ckf", "R1": math.inf, "R2": math.inf}))
+    assert [line.rpartition(", ")[2] for line in lines] == ["got inf", "got inf"]
 
 
 @pytest.mark.parametrize("place", [(), ("actuator",), ("model",)])

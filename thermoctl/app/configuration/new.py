@@ -17,7 +17,8 @@ from thermoctl.app.configuration.document import BadConfiguration, Document, Pro
 from thermoctl.app.configuration.tables import SensorTable
 from thermoctl.app.configuration.toml_text import toml_value
 from thermoctl.app.doubts import HEADROOM_K, Doubt, doubts
-from thermoctl.app.parts import reach_c, sensor_for
+from thermoctl.app.parts import sensor_for
+from thermoctl.app.reach import reach_c
 from thermoctl.app.settings import settings_in
 from thermoctl.control.adaptive import Adaptive
 from thermoctl.errors import ConfigError, Refused

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from thermoctl.app.configuration.tables import SensorTable
-from thermoctl.app.parts import reach_c, sensor_for
+from thermoctl.app.parts import sensor_for
+from thermoctl.app.reach import reach_c
 from thermoctl.app.settings import load
 from thermoctl.errors import ConfigError
 from thermoctl.signals import Quality, RawSample
