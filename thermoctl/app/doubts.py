@@ -12,12 +12,12 @@ from thermoctl.app.readings import coarse_readings
 from thermoctl.app.settings import Settings
 
 HEADROOM_K: Final = 1.0
-"""Least distance from a set point to a trip, under the default law. That passes its set point by
+"""Least distance from a set point to a trip, under `adaptive` alone. That passes its set point by
 0.1 K at most on 19 of 20 tanks (``docs/compare.md``), but a reading that is off by 1 K is still
 believed (`jump_k`), and two of them in a row are a trip."""
 
 _ROUGH_HEADROOM_K: Final = 3.0
-"""The same for any other law; there `on-off` passes it by 2.3 K."""
+"""The same under any other law, or with one in the shadow; there `on-off` passes it by 2.3 K."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +46,11 @@ def _narrow(table: LoopTable) -> Iterator[tuple[str, str]]:
     """Yield key and words of each set point that a usual overshoot takes over a trip.
 
     A heater overshoots upwards, a cooler downwards; of set point and limit the first is enough.
+    The law in the shadow may be put in charge, so there is room for either.
     """
     action = action_of(plan_for(table).controller)
-    least_k = HEADROOM_K if table.controller.kind == "adaptive" else _ROUGH_HEADROOM_K
+    kinds = {law.kind for law in (table.controller, table.shadow) if law is not None}
+    least_k = HEADROOM_K if kinds == {"adaptive"} else _ROUGH_HEADROOM_K
     low_c, high_c = table.setpoint_range_c
     above = ("setpoint_max_c", high_c, "below", "trip_above_c", table.trip_above_c)
     below = ("setpoint_min_c", low_c, "above", "trip_below_c", table.trip_below_c)

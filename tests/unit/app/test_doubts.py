@@ -27,14 +27,20 @@ def test_no_profile_is_doubtful(path):
 
 
 @pytest.mark.parametrize(
-    ("controller", "near_c", "far_c"),
-    [("adaptive", 59.01, 59.0), ("pid", 57.01, 57.0), ("on-off", 57.01, 57.0)],
+    ("laws", "near_c", "far_c"),
+    [
+        ({"controller": "adaptive"}, 59.01, 59.0),
+        ({"controller": "pid"}, 57.01, 57.0),
+        ({"controller": "on-off"}, 57.01, 57.0),
+        ({"controller": "adaptive", "shadow": "pid"}, 57.01, 57.0),
+        ({"controller": "pid", "shadow": "adaptive"}, 57.01, 57.0),
+    ],
 )
-def test_a_set_point_needs_the_room_of_its_law(controller, near_c, far_c):
-    near = told(setpoint_c=near_c, setpoint_max_c=near_c, controller=controller)
+def test_a_set_point_needs_the_room_of_its_laws(laws, near_c, far_c):
+    near = told(setpoint_c=near_c, setpoint_max_c=near_c, **laws)
     assert list(near) == ["setpoint_c"]
     assert f"expected {far_c:g}, {60 - far_c:g} K below trip_above_c" in near["setpoint_c"]
-    assert told(setpoint_c=far_c, setpoint_max_c=far_c, controller=controller) == {}
+    assert told(setpoint_c=far_c, setpoint_max_c=far_c, **laws) == {}
 
 
 def test_the_highest_set_point_needs_room_as_well():
@@ -60,7 +66,7 @@ def test_what_cools_overshoots_downwards():
 
 @pytest.fixture
 def narrow() -> str:
-    """Return the aquarium's configuration with its set point next to the trip, as TOML."""
+    """Return the aquarium, its shadow too, with its set point next to the trip, as TOML."""
     text = default_profile().read_text(encoding="utf-8")
     return text.replace("trip_above_c = 60.0", "trip_above_c = 38.0").replace(
         "setpoint_max_c = 55.0", "setpoint_max_c = 37.5"
@@ -81,7 +87,7 @@ def test_a_bench_test_says_it_at_its_start_and_in_its_history(path, tmp_path, ca
     options = BenchOptions(float("inf"), 5.0, as_json=True, history=history)
     run_bench(bench_settings(path, 1), options)
     line = capsys.readouterr().err.splitlines()[0]
-    assert line.startswith("thermoctl: loops.tank.setpoint_c: expected 37, 1 K below trip_above_c")
+    assert line.startswith("thermoctl: loops.tank.setpoint_c: expected 35, 3 K below trip_above_c")
     with closing(sqlite3.connect(history)) as record:
         rows = record.execute("SELECT count(*) FROM events WHERE name = 'config.narrow'")
         assert rows.fetchone() == (1,)
@@ -89,4 +95,4 @@ def test_a_bench_test_says_it_at_its_start_and_in_its_history(path, tmp_path, ca
 
 def test_the_doctor_warns(path, tmp_path):
     warned = [each.text for each in examine([path], tmp_path) if each.status == WARN]
-    assert any(each.startswith("loops.tank.setpoint_c: expected 37") for each in warned)
+    assert any(each.startswith("loops.tank.setpoint_c: expected 35") for each in warned)
