@@ -10,7 +10,7 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 import serial
 from pydantic import BaseModel
@@ -31,6 +31,9 @@ from thermoctl.runtime.lead import Lead
 from thermoctl.runtime.loop import Loop, Publish
 from thermoctl.runtime.wiring import Input, Output, Wiring
 from thermoctl.signals import Alarm, Mode
+
+ACCEPTANCE: Final = "service.accept_no_dead_man = true"
+"""What is written where a board that cannot switch off by itself is run all the same."""
 
 _WRITE_TIMEOUT_S = 0.5
 
@@ -188,7 +191,7 @@ def wiring_errors(settings: Settings) -> Iterator[tuple[tuple[str, ...], str]]:
             yield (
                 ("boards", name),
                 f"{driver.__name__} cannot switch its output off by itself; add an independent "
-                "thermostat and say service.accept_no_dead_man = true to run it",
+                f"thermostat and say {ACCEPTANCE} to run it",
             )
 
 

@@ -12,7 +12,7 @@ import click
 
 from thermoctl.app import plugins
 from thermoctl.app.commands.options import FILE, examples
-from thermoctl.app.compose import wiring_errors
+from thermoctl.app.compose import ACCEPTANCE, wiring_errors
 from thermoctl.app.configuration.document import BadConfiguration, Document, Problem
 from thermoctl.app.configuration.tables import SensorTable
 from thermoctl.app.configuration.toml_text import toml_value
@@ -24,7 +24,7 @@ from thermoctl.control.adaptive import Adaptive
 from thermoctl.errors import ConfigError, Refused
 
 _WATER_J_PER_L_K = 4186.0
-_HEADROOM_K, _LEAST_HEADROOM_K = 20.0, 2.0  # of a trip above a set point
+_USUAL_TRIP_K, _LEAST_TRIP_K = 20.0, 2.0  # how far a trip that nobody named is from the set point
 _NEAR_BOILING_C, _BOILING_C = 95.0, 100.0
 _CURVES = list(SensorTable.model_json_schema()["properties"]["curve"]["enum"])
 _RESISTIVE = ("pt100", "pt1000", "ntc")
@@ -207,7 +207,7 @@ def _answers(interview: _Interview) -> Answers:
 
 def _trip(setpoint_c: float) -> tuple[float, click.FloatRange]:
     """Return the usual trip above a set point and what may be answered: water boils at 100."""
-    usual_c = max(min(setpoint_c + _HEADROOM_K, _NEAR_BOILING_C), setpoint_c + _LEAST_HEADROOM_K)
+    usual_c = max(min(setpoint_c + _USUAL_TRIP_K, _NEAR_BOILING_C), setpoint_c + _LEAST_TRIP_K)
     if setpoint_c >= _BOILING_C:  # given as an option: then it is no water
         return usual_c, click.FloatRange(min=setpoint_c, min_open=True)
     return min(usual_c, _BOILING_C), click.FloatRange(setpoint_c, _BOILING_C, min_open=True)
@@ -283,7 +283,7 @@ def _loop_lines(answers: Answers) -> list[str]:
 
 def _trip_below_lines(answers: Answers) -> list[str]:
     """Return the lower trip, unless the sensor would call that a broken wire anyway."""
-    trip_below_c = min(0.0, answers.setpoint_c - _HEADROOM_K)
+    trip_below_c = min(0.0, answers.setpoint_c - _USUAL_TRIP_K)
     table = SensorTable.model_validate(
         {"board": "daq", "curve": answers.sensor, "pull_up_ohm": answers.pull_up_ohm}
     )
@@ -309,20 +309,22 @@ def _checked(text: str) -> list[Doubt]:
     document = Document(tomllib.loads(text), "answers")
     try:
         settings = settings_in(document)
+        wrong = [document.problem(*each) for each in wiring_errors(settings)]
+        if wrong:
+            raise BadConfiguration(wrong)
     except BadConfiguration as error:
         raise BadConfiguration([_as_answer(each) for each in error.problems]) from error
-    wrong = [document.problem(*each) for each in wiring_errors(settings)]
-    if wrong:
-        raise BadConfiguration(wrong)
     return doubts(settings)
 
 
 def _as_answer(problem: Problem) -> Problem:
     """Return `problem` with the option it came from, in place of a key that nobody has written."""
     last = problem.key[-1] if problem.key else ""
-    name = "sensor" if last == "curve" else last
+    name = {"curve": "sensor", "daq": "kind"}.get(last, last)
     asked = {each.name for each in new.params}
-    return replace(problem, key=(_option(name),)) if name in asked else problem
+    key = (_option(name),) if name in asked else problem.key
+    text = problem.text.replace(ACCEPTANCE, _option("accept_no_dead_man"))
+    return replace(problem, key=key, text=text)
 
 
 def _write(out: Path, text: str, force: bool) -> None:

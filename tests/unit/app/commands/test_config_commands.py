@@ -459,7 +459,8 @@ def test_a_board_without_a_dead_man_needs_the_promise_of_a_thermostat(run, forei
     arguments = ("config", "new", "--yes", "--kind", "foreign", *KNOWN[2:])
     code, _, err = run(*arguments)
     assert code == 78
-    assert "accept_no_dead_man" in err
+    assert err.startswith("thermoctl: answers: --kind: Foreign cannot switch its output off")
+    assert "add an independent thermostat and say --accept-no-dead-man to run it" in err
     code, out, _ = run(*arguments, "--accept-no-dead-man")
     assert code == 0
     assert tomllib.loads(out)["service"] == {"accept_no_dead_man": True}
