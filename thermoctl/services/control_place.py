@@ -8,7 +8,7 @@ import stat
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Final, Self
 
 from thermoctl.errors import NotPermitted, Unavailable
 from thermoctl.services.lock import DaemonLock
@@ -76,6 +76,21 @@ class ControlPlace:
         self._lock = DaemonLock(path.with_name(f"{path.name}.lock"))
         self._inode: tuple[int, int] | None = None
         self.listener: socket.socket | None = None
+
+    @classmethod
+    def of_daemon(cls, given: Path | None, environ: Mapping[str, str] = os.environ) -> Self:
+        """Return where a daemon listens: at `given`, else at its own path.
+
+        Raises
+        ------
+        Unavailable
+            `given` is too long for any socket, or in no folder: it was mistyped, and opening it
+            would make one.
+        """
+        path = own_path(environ) if given is None else checked(given)
+        if given is not None and not path.parent.is_dir():
+            raise Unavailable(f"expected a folder for --socket {given}, got none at its parent")
+        return cls(path, mode_for(environ))
 
     def open(self) -> socket.socket:
         """Return a socket that listens at the path; a stale one is replaced.

@@ -147,3 +147,16 @@ def test_the_user_s_own_socket_comes_before_the_service_s(tmp_path):
     service = {"RUNTIME_DIRECTORY": "/run/thermoctl"}
     assert usual_paths(service) == [SERVICE]
     assert (mode_for(own), mode_for(service)) == (0o600, 0o660)
+
+
+def test_a_daemon_listens_at_its_own_path_unless_given_another(tmp_path):
+    own = {"XDG_RUNTIME_DIR": str(tmp_path)}
+    assert ControlPlace.of_daemon(None, own).path == own_path(own)
+    assert ControlPlace.of_daemon(tmp_path / "x", own).path == tmp_path / "x"
+
+
+def test_a_path_in_a_folder_that_is_not_there_is_refused_and_makes_none(tmp_path):
+    folder = tmp_path / "mistyped"
+    with pytest.raises(Unavailable, match=f"expected a folder for --socket {folder}/x, got none"):
+        ControlPlace.of_daemon(folder / "x")
+    assert not folder.exists()

@@ -25,9 +25,9 @@ from thermoctl.app.daemon.resuming import Resumption, kept_latches
 from thermoctl.app.doubts import doubts
 from thermoctl.app.parts import law_of_kind
 from thermoctl.app.settings import Settings, default_files, load_all
-from thermoctl.errors import ConfigError, Unavailable
+from thermoctl.errors import ConfigError
 from thermoctl.runtime.clock import MonotonicClock
-from thermoctl.services.control_place import ControlPlace, checked, mode_for, own_path
+from thermoctl.services.control_place import ControlPlace
 from thermoctl.services.control_socket import ControlSocket
 from thermoctl.services.history.schema import RunInfo
 from thermoctl.services.history.writer import HistoryWriter
@@ -87,7 +87,8 @@ class Daemon:
     ConfigError
         The configuration is bad; nothing has been switched on.
     Unavailable
-        Another daemon holds the state folder or a device; or `socket` is too long a path.
+        Another daemon holds the state folder or a device; or `socket` is too long a path, or in
+        no folder.
     """
 
     def __init__(
@@ -130,9 +131,7 @@ class Daemon:
         self._on_terminal = os.isatty(0)
 
     def _control_socket(self, state: Path, given: Path | None) -> ControlSocket:
-        if given is not None and not given.absolute().parent.is_dir():
-            raise Unavailable(f"expected a folder for --socket {given}, got none at its parent")
-        place = ControlPlace(own_path() if given is None else checked(given), mode_for())
+        place = ControlPlace.of_daemon(given)
         periods_s = {name: table.period_s for name, table in self._settings.loops.items()}
         clerk = Clerk(
             self._loop,
