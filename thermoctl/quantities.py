@@ -8,12 +8,13 @@ with a cooler beside the heater it goes down to -1.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+_Values = TypeVar("_Values", bound=npt.NDArray[Any])
 
 _NUMBERS = (int, float, np.integer, np.floating)
 
@@ -33,7 +34,7 @@ def is_finite_number(value: Any) -> bool:
         return False
 
 
-def frozen(values: Array) -> Array:
+def frozen(values: _Values) -> _Values:
     """Return `values` after making the array read-only."""
     values.setflags(False)  # type: ignore[call-arg]  # `write`: by its name it takes twice as long
     return values

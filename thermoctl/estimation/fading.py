@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from thermoctl.estimation.belief import positive, truth
 from thermoctl.estimation.state_space import LinearModel, Prediction, StateLaw, faded
-from thermoctl.quantities import Array, is_finite_number
+from thermoctl.quantities import Array, frozen, is_finite_number
 
 Indices = npt.NDArray[np.intp]
 
@@ -240,6 +240,4 @@ def _observed_states(H: Array) -> Indices:
     """Return the column of the one non-zero in each row, or raise ValueError naming H."""
     if not ((H != 0.0).sum(axis=1) == 1).all():
         raise ValueError(f"H must have exactly one non-zero in each row, got {H.tolist()}")
-    states: Indices = np.argmax(H != 0.0, axis=1)
-    states.setflags(write=False)
-    return states
+    return frozen(np.argmax(H != 0.0, axis=1))

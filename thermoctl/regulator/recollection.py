@@ -6,7 +6,7 @@ time, and an event says why.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
@@ -58,7 +58,7 @@ def origin(mind: Mind) -> str | None:
     return told if isinstance(told, str) else None
 
 
-def remembering(minds: Iterable[Mind | None], watches: Named) -> Callable[[], Models]:
+def remembering(minds: Sequence[Mind | None], watches: Named) -> Callable[[], Models]:
     """Return a function that says what `minds` and `watches` would like kept now."""
     beliefs, heaters = [], {}
     for mind in minds:
@@ -69,7 +69,7 @@ def remembering(minds: Iterable[Mind | None], watches: Named) -> Callable[[], Mo
 
 
 def _remembered(
-    minds: Iterable[Mind | None], beliefs: Iterable[Any], heaters: Mapping[str, Gain | None]
+    minds: Sequence[Mind | None], beliefs: Sequence[Any], heaters: Mapping[str, Gain | None]
 ) -> Models:
     """Return what each law makes of its belief, nothing of one that fails; and the heaters."""
     models: dict[str, Mapping[str, Any]] = {}

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from thermoctl.control.adaptive.constants import Lags
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, frozen
 from thermoctl.ranges import require
 
 SHAPES = ((0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.05, 0.10, 0.85), (0.18, 0.31, 0.51))
@@ -72,7 +72,7 @@ class Hypotheses:
         for each in fields(self):
             value = getattr(self, each.name)
             if isinstance(value, np.ndarray):
-                value.setflags(write=False)
+                frozen(value)
 
     @classmethod
     def at_period(cls, period_s: float, lags: Lags = ANY) -> Self:
