@@ -22,11 +22,16 @@ class AlarmRegister:
         return self._listed
 
     def set(self, alarm: Alarm) -> bool:
-        """Make `alarm` active; return whether it was not. One that was keeps its time."""
+        """Make `alarm` active; return whether it was not. One that was keeps its time.
+
+        It may have become more urgent; what has been acknowledged was the less urgent one then.
+        """
         row = self._rows.get(alarm.code)
         if row is not None and row.active:
             if alarm.latched and not row.latched:
                 self._put(replace(row, latched=True, priority=1, text=alarm.text))
+            elif alarm.priority < row.priority:
+                self._put(replace(alarm, since_s=row.since_s))
             return False
         self._put(alarm)
         return True

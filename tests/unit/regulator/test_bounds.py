@@ -155,7 +155,7 @@ def test_an_output_that_takes_less_is_believed_and_no_fault():
             st.floats() | st.none() | st.text(max_size=3) | st.integers(),
             st.floats() | st.none(),
             st.sampled_from(list(Quality)) | st.none() | st.text(max_size=3),
-            st.floats(),
+            st.floats() | st.none() | st.text(max_size=3),
         ),
         max_size=40,
     )

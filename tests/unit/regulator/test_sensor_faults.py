@@ -62,11 +62,25 @@ def test_a_missing_sample_is_ridden_on_the_model_at_most_at_holding_power(warm):
 def test_a_ride_alarms_after_five_seconds_and_ends_safe_within_a_minute(warm):
     assert not warm.run(4, Quality.MISSING).alarms
     alarmed = warm.run(2, Quality.MISSING)
-    assert [alarm.code for alarm in alarmed.alarms] == ["sensor.missing"]
+    assert [(alarm.code, alarm.priority) for alarm in alarmed.alarms] == [("sensor.missing", 2)]
     seconds = 6 + warm.seconds_to_power_0(Quality.MISSING)
     print(f"sensor missing, model known: power 0 after {seconds} s")
     assert seconds <= 60
     assert warm.steps[-1].state is State.SAFE
+
+
+def test_an_alarm_that_was_a_warning_when_it_was_acknowledged_rings_anew_when_it_costs_the_heat(
+    warm,
+):
+    warned = warm.run(6, Quality.MISSING).alarms
+    warm.regulator.request(Acknowledge())
+    acknowledged = warm.step(Quality.MISSING).alarms
+    warm.seconds_to_power_0(Quality.MISSING)
+    off = warm.steps[-1].alarms
+    assert [(row.priority, row.acknowledged) for row in warned] == [(2, False)]
+    assert [(row.priority, row.acknowledged) for row in acknowledged] == [(2, True)]
+    assert [(row.priority, row.acknowledged) for row in off] == [(1, False)]
+    assert off[0].since_s == warned[0].since_s
 
 
 def test_before_a_model_is_known_the_last_output_is_held_for_three_seconds(drive_with):
