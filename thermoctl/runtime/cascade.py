@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 
 from thermoctl.runtime.lead import Lead
-from thermoctl.runtime.store import Store
+from thermoctl.runtime.stored_heat import StoredHeat
 from thermoctl.runtime.wiring import Wiring
 from thermoctl.signals import Measurement, Quality
 
@@ -44,7 +44,7 @@ class Cascade:
         named = {each.name: each for each in wirings}
         self._leads = [(each, each.lead) for each in named.values() if each.lead is not None]
         followers = [named[lead.inner] for _, lead in self._leads]
-        self._stores = {each.name: Store() for each in followers if _only_heats(each)}
+        self._stored = {each.name: StoredHeat() for each in followers if _only_heats(each)}
         self.gave: Mapping[str, float] = {}
         """Power that each loop gave in the last cycle; NaN: not known."""
 
@@ -61,16 +61,16 @@ class Cascade:
 
     def _kept_s(self, inner: str, block: Measurement, bath: Measurement) -> float:
         """Return for how long a block goes on giving heat that it holds."""
-        if inner not in self._stores:
+        if inner not in self._stored:
             return 0.0
         power = self.gave.get(inner, math.nan)
         block_c, bath_c = (
             each.temperature_c if each.quality is Quality.GOOD else math.nan
             for each in (block, bath)
         )
-        store = self._stores[inner].after(block.t_s, power, block_c, bath_c)
-        self._stores[inner] = store
-        return store.lasts_s
+        heat = self._stored[inner].after(block.t_s, power, block_c, bath_c)
+        self._stored[inner] = heat
+        return heat.lasts_s
 
 
 def _only_heats(wiring: Wiring) -> bool:

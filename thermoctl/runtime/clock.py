@@ -1,6 +1,6 @@
-"""The two kinds of time: the machine's monotonic clock, and a simulated one.
+"""The kinds of time: the machine's monotonic clock, a simulated and a paced one.
 
-Both satisfy `thermoctl.ports.Clock`, so an hour in a simulation runs the code a real hour runs.
+All satisfy `thermoctl.ports.Clock`, so an hour in a simulation runs the code a real hour runs.
 """
 
 from __future__ import annotations

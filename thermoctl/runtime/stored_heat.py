@@ -45,7 +45,7 @@ class Sums(NamedTuple):
     rate_above: float = 0.0
 
 
-class Store(NamedTuple):
+class StoredHeat(NamedTuple):
     """What is known of the heat that a block keeps.
 
     Parameters
@@ -64,22 +64,22 @@ class Store(NamedTuple):
     above_k: float = 0.0
     sums: Sums = Sums()
 
-    def after(self, t_s: float, power: float, block_c: float, bath_c: float) -> Store:
+    def after(self, t_s: float, power: float, block_c: float, bath_c: float) -> StoredHeat:
         """Return the same after `power` until `t_s` and two readings of then, in degC.
 
         What is not finite is a gap: the filters begin anew, and what is known stays.
         """
         if not math.isfinite(t_s + power + block_c + bath_c):
-            return Store(sums=self.sums)
+            return StoredHeat(sums=self.sums)
         above_k, interval_s = block_c - bath_c, t_s - self.t_s
         if not 0.0 < interval_s <= GAP_S:  # NaN too
-            return Store(t_s, block_c=block_c, sums=self.sums)  # all filters at rest, alike
+            return StoredHeat(t_s, block_c=block_c, sums=self.sums)  # all filters at rest, alike
         share = interval_s / (FILTER_S + interval_s)
         smooth_c = self.block_c + share * (block_c - self.block_c)
         rate = (smooth_c - self.block_c) / interval_s
         given = self.power + share * (power - self.power)
         above = self.above_k + share * (above_k - self.above_k)
-        return Store(t_s, given, smooth_c, above, _with(self.sums, given, rate, above))
+        return StoredHeat(t_s, given, smooth_c, above, _with(self.sums, given, rate, above))
 
     @property
     def lasts_s(self) -> float:
