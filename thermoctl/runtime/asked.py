@@ -1,7 +1,12 @@
-"""A request on its way to the loop, and the answer on its way back."""
+"""Requests on their way to the loops, and their answers on the way back."""
 
 from __future__ import annotations
 
+import queue
+from collections.abc import Callable, Sequence
+
+from thermoctl.errors import Refused
+from thermoctl.runtime.wiring import Wiring
 from thermoctl.signals import Request
 
 _UNFINISHED = "the cycle that took it failed"
@@ -54,3 +59,58 @@ class Asked:
     def refusal(self) -> str | None:
         """Why it was refused, None when granted; only worth reading once it is settled."""
         return self._refusal
+
+
+class RequestQueue:
+    """Requests of all threads: granted at the top of a cycle, answered at its end.
+
+    Parameters
+    ----------
+    wirings : sequence of Wiring
+        The loops that may be asked.
+    report : callable
+        Called as ``report(name, **fields)`` for ``request.refused``.
+    """
+
+    def __init__(self, wirings: Sequence[Wiring], report: Callable[..., None]) -> None:
+        self._wirings, self._report = wirings, report
+        self._waiting: queue.SimpleQueue[Asked] = queue.SimpleQueue()
+        self._claimed: list[Asked] = []
+
+    def put(self, request: Request, loop: str | None) -> Asked:
+        """Append a request to `loop`, None: to all of them. Called from any thread."""
+        asked = Asked(request, loop)
+        self._waiting.put(asked)
+        return asked
+
+    def qsize(self) -> int:
+        """Return how many wait for the next cycle."""
+        return self._waiting.qsize()
+
+    def grant(self) -> None:
+        """Hand what has come so far to the loops that it is meant for."""
+        for _ in range(self._waiting.qsize()):  # what comes meanwhile waits for the next cycle
+            asked = self._waiting.get_nowait()
+            if asked.claim():
+                self._claimed.append(asked)
+                asked.decide(self._grant(asked))
+
+    def _grant(self, asked: Asked) -> str | None:
+        """Hand a request to the loops it is meant for; return the refusal, if any."""
+        meant = [each for each in self._wirings if asked.loop in (None, each.name)]
+        refusal = None if meant else f"there is no loop {asked.loop!r}"
+        if not meant:
+            self._report("request.refused", loop=asked.loop, why=refusal)
+        for wiring in meant:
+            try:
+                wiring.regulator.request(asked.request)
+            except Refused as refused:
+                refusal = str(refused)
+                self._report("request.refused", loop=wiring.name, why=refusal)
+        return refusal
+
+    def settle(self) -> None:
+        """Answer what this cycle took, now that everybody can see the outcome."""
+        for asked in self._claimed:
+            asked.settle()
+        self._claimed.clear()

@@ -7,7 +7,6 @@ the answer is always: power 0, said loudly, and on with the next cycle.
 from __future__ import annotations
 
 import math
-import queue
 import time
 import traceback
 from collections import deque
@@ -15,10 +14,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import TypeVarTuple
 
-from thermoctl.errors import DriverError, FaultError, LinkError, Refused
+from thermoctl.errors import DriverError, FaultError, LinkError
 from thermoctl.ports import Clock
 from thermoctl.regulator.limits import command_lasts_s
-from thermoctl.runtime.asked import Asked
+from thermoctl.runtime.asked import Asked, RequestQueue
 from thermoctl.runtime.cascade import Cascade, hand_down, outer_first
 from thermoctl.runtime.connection import Connection
 from thermoctl.runtime.wiring import Input, Output, Wiring, signed
@@ -35,7 +34,7 @@ AWAITED_S = 10.0
 _EVENTS = 256
 
 Publish = Callable[[Cycle], None]
-Told = TypeVarTuple("Told")
+Args = TypeVarTuple("Args")
 
 
 class Loop:
@@ -75,8 +74,7 @@ class Loop:
         self._lasts_s = command_lasts_s(period_s)
         self._fresh_s = max(FRESH_S, 1.5 * period_s)
         self._publish, self._completed = publish, completed
-        self._requests: queue.SimpleQueue[Asked] = queue.SimpleQueue()
-        self._claimed: list[Asked] = []
+        self._requests = RequestQueue(self.wirings, self.report)
         self._events: deque[tuple[str, Mapping[str, object]]] = deque(maxlen=_EVENTS)
         self._silent: set[str] = set()
         self._sound = True
@@ -94,9 +92,7 @@ class Loop:
 
         What is returned is settled once that cycle is published, for whoever wants the answer.
         """
-        asked = Asked(request, loop)
-        self._requests.put(asked)
-        return asked
+        return self._requests.put(request, loop)
 
     def stop(self) -> None:
         """End `run` after the cycle that is under way; a signal handler may call it."""
@@ -110,6 +106,14 @@ class Loop:
     def report(self, name: str, **fields: object) -> None:
         """Add an event to the next published cycle."""
         self._events.append((name, fields))
+
+    def take_events(self) -> tuple[Event, ...]:
+        """Return what was reported since the last cycle was published."""
+        if not self._events:
+            return ()
+        now_s = self._clock.now_s()
+        taken = [self._events.popleft() for _ in range(len(self._events))]
+        return tuple(Event(now_s, name, fields) for name, fields in taken)
 
     # -- time ------------------------------------------------------------------------------------
 
@@ -139,12 +143,12 @@ class Loop:
         except Exception as error:  # noqa: BLE001 - the last line of defence ends in "heater off"
             self._all_off()
             self._fail(self.wirings, "cycle.failed", error)
-            self._stand_in()
-        self._settle()
+            self._publish_failed()
+        self._requests.settle()
         if self._sound:
             self.cycles += 1
             self._failure = ""
-            self._harmless(self._completed)
+            self._call_isolated(self._completed)
 
     def shut_down(self) -> bool:
         """Write power 0 to every board, let them go; return whether all must be off."""
@@ -161,14 +165,14 @@ class Loop:
         if late_s > SUSPENDED_S:
             self._all_off()
             self.report("cycle.late", late_s=late_s)
-        self._grant_requests()
+        self._requests.grant()
         samples, seen = {}, {}  # filled in loops: a comprehension takes twice as long
         for board in self.boards:
             samples[id(board)] = self._read(board)
-        if self._awaits():
+        if self._boards_awaited():
             return  # no reading is missing yet, and no output is on
         for wiring in self.wirings:
-            seen[wiring.name] = self._see(wiring, samples)
+            seen[wiring.name] = self._measure(wiring, samples)
         led = self._cascade.tell(seen)
         walked, steps = [], {}
         for wiring in self.wirings:
@@ -180,9 +184,9 @@ class Loop:
         events = self.take_events()
         for wiring, step, tick_us in walked:
             taken = accepted[wiring.name]
-            self._harmless(self._hand_out, wiring, step, events, taken, tick_us, late_s)
+            self._call_isolated(self._publish_cycle, wiring, step, events, taken, tick_us, late_s)
 
-    def _awaits(self) -> bool:
+    def _boards_awaited(self) -> bool:
         """Return whether a board is being opened for the first time, and is not late yet.
 
         All loops wait for it: one that follows another must not begin before its master.
@@ -197,15 +201,15 @@ class Loop:
             samples = board.read(self._clock.now_s() + EXCHANGE_S)
         except LinkError as error:
             if not board.awaited:
-                self._tell(board, "board.lost", 13, str(error))
+                self._report_fault(board, "board.lost", 13, str(error))
         except DriverError as error:
-            if isinstance(error, FaultError) and self._users(board):
-                self._tell(board, "board.fault", 25, str(error))
+            if isinstance(error, FaultError) and self._dependents(board):
+                self._report_fault(board, "board.fault", 25, str(error))
             elif board.name not in self._silent:
                 self.report("board.silent", board=board.name, error=str(error))
                 self._silent.add(board.name)
         except Exception as error:  # noqa: BLE001 - drivers come from entry points
-            users = self._users(board)
+            users = self._dependents(board)
             if users or board.name not in self._silent:  # a board that can be spared: once
                 self._fail(users, "cycle.failed", error)
             self._silent.add(board.name)
@@ -214,14 +218,16 @@ class Loop:
             return samples
         return {}
 
-    def _see(self, wiring: Wiring, samples: Mapping[int, Mapping[str, RawSample]]) -> Measurement:
+    def _measure(
+        self, wiring: Wiring, samples: Mapping[int, Mapping[str, RawSample]]
+    ) -> Measurement:
         """Return what the sensor of a loop says, or its two sensors together."""
-        first = self._measure(wiring, wiring.inputs[0], samples)
+        first = self._measure_input(wiring, wiring.inputs[0], samples)
         if wiring.second is None:
             return first
-        return wiring.regulator.fuse(first, self._measure(wiring, wiring.second, samples))
+        return wiring.regulator.fuse(first, self._measure_input(wiring, wiring.second, samples))
 
-    def _measure(
+    def _measure_input(
         self, wiring: Wiring, read: Input, samples: Mapping[int, Mapping[str, RawSample]]
     ) -> Measurement:
         """Return what an input says; a sample that is not of these seconds is STALE."""
@@ -259,10 +265,10 @@ class Loop:
             except DriverError as error:
                 lost = isinstance(error, LinkError)
                 code, fault = ("board.lost", 13) if lost else ("output.refused", 22)
-                self._tell(board, code, fault, str(error))
+                self._report_fault(board, code, fault, str(error))
             except Exception as error:  # noqa: BLE001 - drivers come from entry points
                 self._off(board)
-                self._fail(self._users(board), "cycle.failed", error)
+                self._fail(self._dependents(board), "cycle.failed", error)
             else:
                 taken.update(powers)
         accepted = dict(led)
@@ -290,7 +296,7 @@ class Loop:
             self._fail((wiring,), "cycle.failed", error)
             return 0.0
 
-    def _hand_out(
+    def _publish_cycle(
         self,
         wiring: Wiring,
         step: Step,
@@ -306,13 +312,13 @@ class Loop:
 
     # -- when something fails --------------------------------------------------------------------
 
-    def _users(self, board: Connection) -> tuple[Wiring, ...]:
+    def _dependents(self, board: Connection) -> tuple[Wiring, ...]:
         """Return the loops that cannot do without `board`."""
         return tuple(w for w in self.wirings if board in w.needs)
 
-    def _tell(self, board: Connection, code: str, fault: int, text: str) -> None:
+    def _report_fault(self, board: Connection, code: str, fault: int, text: str) -> None:
         """Send every loop that depends on `board` to SAFE."""
-        for wiring in self._users(board):
+        for wiring in self._dependents(board):
             wiring.regulator.fault(code, fault, text)
 
     def _fail(self, wirings: Iterable[Wiring], code: str, error: Exception) -> None:
@@ -344,57 +350,20 @@ class Loop:
                 return False
         return not board.driven
 
-    def _stand_in(self) -> None:
+    def _publish_failed(self) -> None:
         """Publish a cycle without a reading for one that failed, so that it is seen and heard."""
         events = self.take_events()
         unread = Measurement(self._clock.now_s(), quality=Quality.MISSING)
 
         def publish(wiring: Wiring) -> None:
-            self._hand_out(wiring, wiring.regulator.step(unread), events, math.nan, 0.0, 0.0)
+            self._publish_cycle(wiring, wiring.regulator.step(unread), events, math.nan, 0.0, 0.0)
 
         for wiring in self.wirings:
-            self._harmless(publish, wiring)
+            self._call_isolated(publish, wiring)
 
-    def _harmless(self, call: Callable[[*Told], None], *told: *Told) -> None:
+    def _call_isolated(self, call: Callable[[*Args], None], *args: *Args) -> None:
         """Make a call that must steer nothing; one that fails is told of, and that is all."""
         try:
-            call(*told)
+            call(*args)
         except Exception as error:  # noqa: BLE001 - readers may fail in any way
             self._fail((), "feed.failed", error)
-
-    # -- small things ----------------------------------------------------------------------------
-
-    def _grant_requests(self) -> None:
-        for _ in range(self._requests.qsize()):  # what comes meanwhile waits for the next cycle
-            asked = self._requests.get_nowait()
-            if asked.claim():
-                self._claimed.append(asked)
-                asked.decide(self._grant(asked))
-
-    def _grant(self, asked: Asked) -> str | None:
-        """Hand a request to the loops it is meant for; return the refusal, if any."""
-        meant = [each for each in self.wirings if asked.loop in (None, each.name)]
-        refusal = None if meant else f"there is no loop {asked.loop!r}"
-        if not meant:
-            self.report("request.refused", loop=asked.loop, why=refusal)
-        for wiring in meant:
-            try:
-                wiring.regulator.request(asked.request)
-            except Refused as refused:
-                refusal = str(refused)
-                self.report("request.refused", loop=wiring.name, why=refusal)
-        return refusal
-
-    def _settle(self) -> None:
-        """Answer what this cycle took from the queue, now that everybody can see the outcome."""
-        for asked in self._claimed:
-            asked.settle()
-        self._claimed.clear()
-
-    def take_events(self) -> tuple[Event, ...]:
-        """Return what was reported since the last cycle was published."""
-        if not self._events:
-            return ()
-        now_s = self._clock.now_s()
-        taken = [self._events.popleft() for _ in range(len(self._events))]
-        return tuple(Event(now_s, name, fields) for name, fields in taken)

@@ -167,7 +167,7 @@ def test_a_cycle_that_failed_feeds_no_watchdog_and_is_published_all_the_same(mon
     def fail():
         raise LookupError("in the middle of the walk")
 
-    monkeypatch.setattr(house.loop, "_grant_requests", fail)
+    monkeypatch.setattr(house.loop._requests, "grant", fail)
     house.run(4)
     assert (house.completed, len(house.cycles)) == (3, 14)
     assert [board.power for board in house.boards] == [0.0, 0.0]
