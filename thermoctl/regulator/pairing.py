@@ -13,12 +13,13 @@ warm-up nor a jug of cold water looks like a sensor that drifts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from thermoctl.quantities import is_finite_number
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.limits import Limits
+from thermoctl.regulator.supervisor import Emit
 from thermoctl.signals import Alarm, Measurement, Quality
 
 LAG_S = 30.0
@@ -31,8 +32,6 @@ _NAMES = ("first", "second")
 _WORST_FIRST = (Quality.OPEN, Quality.SHORT, Quality.STALE)
 _FAULTS = {Quality.OPEN: 1, Quality.SHORT: 2}
 _NO_READING = 16
-
-Emit = Callable[..., None]
 
 
 def is_good(measurement: Measurement) -> bool:

@@ -6,10 +6,11 @@ from collections import deque
 import numpy as np
 import pytest
 
+from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.check import HeaterCheck
 from thermoctl.regulator.heater.climb import Climb
-from thermoctl.regulator.heater.doubt import HeatDoubt, Seen
-from thermoctl.regulator.heater.response import Block, Gain
+from thermoctl.regulator.heater.doubt import HeatDoubt
+from thermoctl.regulator.heater.response import Gain, Seen
 from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor

@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from thermoctl.regulator.heater.doubt import HeatDoubt, Seen
-from thermoctl.regulator.heater.response import Block, Gain
+from thermoctl.regulator.heater.blocks import Block
+from thermoctl.regulator.heater.doubt import HeatDoubt
+from thermoctl.regulator.heater.response import Gain, Seen
 
 GAIN = Gain(0.5, 0.01, 1)
 SPAN_S, SD_K, HELD = 4.0, 0.03, 0.55

@@ -7,10 +7,9 @@ import pytest
 
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
-from thermoctl.regulator.heater.doubt import Seen
 from thermoctl.regulator.heater.evidence import SOUND, SURE, odds, weigh
 from thermoctl.regulator.heater.question import Answer
-from thermoctl.regulator.heater.response import LAGS_S, Gain
+from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
 from thermoctl.signals import Measurement, State
 
 GAIN, SPAN_S, SD_K = Gain(0.045, 0.001, 2), 4.0, 0.01

@@ -9,9 +9,9 @@ import pytest
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
 from thermoctl.regulator.balance.feasible import Wanted
+from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.ceiling import FELL_K, FOLLOWED_S, Ceiling
-from thermoctl.regulator.heater.doubt import Seen
-from thermoctl.regulator.heater.response import LAGS_S, Block, Gain
+from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
 from thermoctl.signals import Measurement, Mode
 
 pytestmark = pytest.mark.slow  # together more than the quick subset can afford

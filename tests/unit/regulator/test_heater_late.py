@@ -5,10 +5,9 @@ import pytest
 
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
-from thermoctl.regulator.heater.doubt import Seen
 from thermoctl.regulator.heater.evidence import SOUND, weigh
 from thermoctl.regulator.heater.question import Answer, contrast, of_known
-from thermoctl.regulator.heater.response import LAGS_S, Gain
+from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
 from thermoctl.signals import Measurement
 
 pytestmark = pytest.mark.slow  # together more than the quick subset can afford

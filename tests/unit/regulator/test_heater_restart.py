@@ -9,10 +9,9 @@ import pytest
 
 from thermoctl.regulator.heater import memory as heater_memory
 from thermoctl.regulator.heater.check import HeaterCheck
-from thermoctl.regulator.heater.doubt import Seen
 from thermoctl.regulator.heater.known import OFF_LAGS, KnownHeater
 from thermoctl.regulator.heater.past import FirstReadings
-from thermoctl.regulator.heater.response import LAGS_S, Gain
+from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
 from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor

@@ -9,11 +9,11 @@ import pytest
 from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load
 from thermoctl.errors import ConfigError
-from thermoctl.regulator.heater.blocks import Blocks, Repeats
+from thermoctl.regulator.heater.blocks import Block, Blocks
 from thermoctl.regulator.heater.check import HeaterCheck, weakest_of
-from thermoctl.regulator.heater.doubt import Seen
 from thermoctl.regulator.heater.question import Answer, contrast, of_known, of_unknown
-from thermoctl.regulator.heater.response import Block, Gain, HeatResponse
+from thermoctl.regulator.heater.response import Gain, HeatResponse, Seen
+from thermoctl.regulator.heater.stuck_sensor import StuckSensor
 from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor
@@ -401,7 +401,7 @@ def test_a_block_has_the_mean_of_its_readings_and_none_without_any():
 
 def test_equal_readings_are_a_fault_only_where_noise_is_larger_than_a_step():
     rng = np.random.default_rng(7)
-    fine, coarse = Repeats(), Repeats()
+    fine, coarse = StuckSensor(), StuckSensor()
     for n in range(5000):
         water_c = 37.0 + 0.1 * math.sin(n / 300.0)
         noise_k = 0.02 * rng.standard_normal()

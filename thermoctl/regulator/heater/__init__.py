@@ -1,7 +1,16 @@
 """Whether the reading answers to the heater.
 
-`watch.HeaterWatch` sees every sample and asks when in doubt. What it leans on: `response` learns
-what heat does, `known` whether that will do, `doubt` and `climb` hold readings against it, `trial`
-gives an unknown heater its time, `question` reads the answer and `hearing` believes it or not,
-`ceiling` tells a plant that gets no warmer, `memory` keeps what is known between runs.
+`watch.HeaterWatch` sees every sample and asks when in doubt: it cuts the power and looks at what
+the reading does. `check` has its settings; `led` watches a block that another loop heats, and
+`sides` a heater with a cooler beside it. In the order in which a sample meets them:
+
+- `stuck_sensor` tells a converter that repeats itself, `blocks` gathers samples over four seconds.
+- `response` learns gain and lag of the heater by regression, `past` what was before a start, and
+  `known` keeps what may be relied on.
+- `doubt` holds readings against that model, `climb` against the last rise, `ceiling` knows the
+  temperature that a plant does not pass. `trial` gives an unknown heater its time to show a rise.
+- `cut` is a question that is being put, `question` the regression that reads the answer, `evidence`
+  weighs loads against faults, `fall` knows a fall that no heater makes, and `hearing` says when an
+  answer is believed.
+- `memory` keeps what is known between runs.
 """

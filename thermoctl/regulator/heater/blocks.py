@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-
-from thermoctl.regulator.heater.response import Block
+from typing import NamedTuple
 
 BLOCK_S = 4.0
 NOISE_START_K2 = 1e-3
@@ -13,9 +12,29 @@ NOISE_MIN_K2 = 1e-6
 _MOST = 9.0  # a square counts as three standard deviations at most
 _MEMORY = 0.01  # of 100 readings
 _SPREAD = 6.0  # variance of y - 2 y1 + y2 in units of the noise's: 1 + 4 + 1
-_SURE = 30.0  # exponent of the odds against a run of equal readings
 _ROUNDED = 1.0 / math.sqrt(12.0)  # standard deviation of what a step rounds off, in steps
 _STEP_MAX_K = 0.5  # no converter is taken to be coarser
+
+
+class Block(NamedTuple):
+    """Some seconds of a loop.
+
+    Parameters
+    ----------
+    span_s : float
+        How long.
+    power : float
+        Mean of what was applied.
+    reading_c : float
+        Mean reading; NaN where there was none.
+    sd_k : float
+        Its standard deviation, by the noise of the readings.
+    """
+
+    span_s: float
+    power: float
+    reading_c: float
+    sd_k: float
 
 
 class Blocks:
@@ -68,61 +87,3 @@ class Blocks:
         # What is rounded off stays the same for many readings: their mean is no better.
         sd_k = math.hypot(math.sqrt(self._variance / max(n, 1)), _ROUNDED * self._step_k)
         return Block(span_s, given_s / span_s, mean_c, sd_k)
-
-
-class Repeats:
-    """Tells a converter that stands still from one with coarse steps.
-
-    Noise beyond a step makes readings turn back all the time, up and down; a drift through the
-    steps of a quiet converter does not. Where many turn back, a run of equal readings is judged by
-    the share of those that equal the one before: next to impossible is a converter that stands.
-    """
-
-    LEAST = 10
-    KNOWN_AFTER = 200
-    MEMORY = 1 / 500
-    TURNS_MIN = 0.4
-    """Least share of readings that turn back, for equal ones in a row to prove anything. In pure
-    noise two thirds do; with fewer the noise is below a step."""
-    MORE, AND = 1.3, 0.02
-    """The expected share of equal readings is MORE times the usual one plus AND: it depends on
-    where the reading lies between two steps."""
-
-    def __init__(self) -> None:
-        self._last_c = math.nan
-        self._moved_k = 0.0
-        self._run = self._seen = 0
-        self._equal = self._turns = 0.0
-
-    def observe(self, reading_c: float) -> bool:
-        """Return whether the converter stands still; NaN is no reading, and says nothing."""
-        if reading_c == self._last_c:
-            self._run += 1
-            return self._stands()
-        if reading_c == reading_c:
-            moved_k = reading_c - self._last_c
-            if self._run < self.LEAST or not self._stands():  # a run that was a fault says nothing
-                self._learn(moved_k * self._moved_k < 0.0)
-            self._moved_k, self._last_c, self._run = moved_k, reading_c, 0
-        return False
-
-    @property
-    def run(self) -> int:
-        """How many readings in a row have equalled the one before."""
-        return self._run
-
-    def _learn(self, turned: bool) -> None:
-        """Learn from a reading that moved, and from the equal ones before it."""
-        count = self._run + 1
-        self._seen += count
-        share = min(max(self.MEMORY, 1.0 / self._seen) * count, 1.0)
-        self._equal += share * (self._run / count - self._equal)
-        self._turns += share * (turned / count - self._turns)
-
-    def _stands(self) -> bool:
-        """Return whether the run is too long for a converter that is alive."""
-        if self._run < self.LEAST:  # nearly always
-            return False
-        known = self._seen >= self.KNOWN_AFTER and self._turns >= self.TURNS_MIN
-        odds = -math.log(min(self.MORE * self._equal + self.AND, 0.99))
-        return known and self._run >= math.ceil(_SURE / odds)

@@ -18,9 +18,10 @@ import math
 from collections.abc import Iterable, Sequence
 
 from thermoctl.regulator.heater import evidence
+from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.climb import KEEPS, STALLED_S
-from thermoctl.regulator.heater.doubt import SDS, STANDS_K, Seen
-from thermoctl.regulator.heater.response import Block, Gain
+from thermoctl.regulator.heater.doubt import SDS, STANDS_K
+from thermoctl.regulator.heater.response import Gain, Seen
 
 FELL_K, FELL_SDS = 0.2, 8.0
 """A fall counts beyond both, in K and in standard deviations of a reading. A sensor that wanders in

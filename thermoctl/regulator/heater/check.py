@@ -29,7 +29,6 @@ class HeaterCheck:
         point shows no rise.
     action : {'heat', 'cool', 'heat-cool'}
         What power does to the plant; heat-cool: above 0 the one and below 0 the other.
-
     block_c : tuple of float, optional
         Where another loop acts in place of a heater: its temperatures at power 0 and 1, in degC.
 

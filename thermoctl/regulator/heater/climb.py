@@ -25,6 +25,7 @@ from __future__ import annotations
 import math
 
 from thermoctl.quantities import clamp
+from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.doubt import (
     CALM,
     CALM_SDS,
@@ -33,9 +34,8 @@ from thermoctl.regulator.heater.doubt import (
     LEAST_K,
     SDS,
     SURE_SHARE,
-    Seen,
 )
-from thermoctl.regulator.heater.response import LAGS_S, Block, Gain
+from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
 
 STRETCH_S, STRETCH_K, STRETCH_SDS = 8.0, 0.1, 6.0
 """Least length of a stretch in s, and its least rise in K and in standard deviations of a reading;

@@ -14,10 +14,10 @@ no more in a block than a heater could do, so that a litre of cold water is soon
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from thermoctl.quantities import clamp
-from thermoctl.regulator.heater.response import LAGS_S, Block, Gain, Heat
+from thermoctl.regulator.heater.blocks import Block
+from thermoctl.regulator.heater.response import LAGS_S, Gain, Heat, Seen
 
 LEAST_K, SDS, LAGS = 0.3, 5.0, 1.0
 """A sum is a doubt when it exceeds all three: LEAST_K in K, SDS standard deviations of a reading,
@@ -81,14 +81,6 @@ COOLS_WITHIN_S = 1000.0
 """For every kelvin above where the loss was learnt it may have grown by 1 K in this time in s, as
 that of half a litre in a draught; by more on a plant that was seen to cool faster. That much more
 power is no doubt."""
-
-
-class Seen(NamedTuple):
-    """Reading in degC and heat under every lag in s, at a time in s."""
-
-    t_s: float
-    reading_c: float
-    heat_s: Heat
 
 
 class HeatDoubt:

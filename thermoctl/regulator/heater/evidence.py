@@ -23,10 +23,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from thermoctl.quantities import Array
-from thermoctl.regulator.heater.doubt import Seen
 from thermoctl.regulator.heater.known import CHANGED
 from thermoctl.regulator.heater.question import Answer, near, or_longer
-from thermoctl.regulator.heater.response import Gain
+from thermoctl.regulator.heater.response import Gain, Seen
 
 SOUND, SURE = 5.0, 3.0
 """Log odds above which a heater is sound, 150 to one, and above which the likelier claim counts as

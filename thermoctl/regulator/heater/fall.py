@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from thermoctl.regulator.heater.doubt import Seen
 from thermoctl.regulator.heater.question import slope
-from thermoctl.regulator.heater.response import Gain
+from thermoctl.regulator.heater.response import Gain, Seen
 
 WILD, RESTS = 1.3, 0.5
 """A fall, less the loss, is too fast for any heater beyond WILD times its gain, and over below

@@ -10,9 +10,8 @@ from collections.abc import Collection
 
 from thermoctl.regulator.heater import evidence, question
 from thermoctl.regulator.heater.cut import Cut
-from thermoctl.regulator.heater.doubt import Seen
 from thermoctl.regulator.heater.question import Answer
-from thermoctl.regulator.heater.response import Gain
+from thermoctl.regulator.heater.response import Gain, Seen
 
 HEARD_S, HEARD_LAGS = 20.0, 0.5
 """Time after the cut from which on a good answer is believed: in s of an unknown heater, in lags of

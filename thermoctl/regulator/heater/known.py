@@ -22,8 +22,8 @@ less power and the reading obeys. Until then heat may be under way for as long a
 
 from __future__ import annotations
 
-from thermoctl.regulator.heater.doubt import LEAST_K, SDS, Seen
-from thermoctl.regulator.heater.response import LAGS_S, Gain
+from thermoctl.regulator.heater.doubt import LEAST_K, SDS
+from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
 from thermoctl.regulator.heater.trial import RISE_K, RISE_SDS
 
 SURE = 5.0

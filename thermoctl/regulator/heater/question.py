@@ -20,8 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from thermoctl.quantities import Array
-from thermoctl.regulator.heater.doubt import Seen
-from thermoctl.regulator.heater.response import LAGS_S, Gain
+from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
 
 ROWS_LEAST = 6
 SURE = 4.0

@@ -26,6 +26,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.past import MOVES, FirstReadings, Past
 
 Heat = tuple[float, ...]
@@ -62,27 +63,6 @@ MIXES_S = 100.0
 the reading would pass for a heater of thirty times the gain."""
 
 
-class Block(NamedTuple):
-    """Some seconds of a loop.
-
-    Parameters
-    ----------
-    span_s : float
-        How long.
-    power : float
-        Mean of what was applied.
-    reading_c : float
-        Mean reading; NaN where there was none.
-    sd_k : float
-        Its standard deviation, by the noise of the readings.
-    """
-
-    span_s: float
-    power: float
-    reading_c: float
-    sd_k: float
-
-
 class Gain(NamedTuple):
     """Rise at full power in K/s, its sd, and the place of its lag in `LAGS_S`.
 
@@ -103,6 +83,14 @@ class Gain(NamedTuple):
     def stored_k(self) -> float:
         """Rise in a lag at full power, in K: what is under way, and nobody can see yet."""
         return self.mean * self.lag_s
+
+
+class Seen(NamedTuple):
+    """Reading in degC and heat under every lag in s, at a time in s."""
+
+    t_s: float
+    reading_c: float
+    heat_s: Heat
 
 
 class _Path:

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 
+from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.check import HeaterCheck
-from thermoctl.regulator.heater.doubt import Seen
-from thermoctl.regulator.heater.response import LAGS_S, Block
+from thermoctl.regulator.heater.response import LAGS_S, Seen
 
 RISE_K, RISE_SDS = 0.1, 6.0
 """A rise counts beyond both, in K and in standard deviations of a reading."""

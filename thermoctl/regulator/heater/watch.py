@@ -12,15 +12,16 @@ import math
 from collections import deque
 
 from thermoctl.regulator.heater import ceiling, climb, evidence, fall, hearing, question, trial
-from thermoctl.regulator.heater.blocks import Blocks, Repeats
+from thermoctl.regulator.heater.blocks import Block, Blocks
 from thermoctl.regulator.heater.ceiling import Ceiling
 from thermoctl.regulator.heater.check import HeaterCheck, Reacts
 from thermoctl.regulator.heater.climb import Climb
 from thermoctl.regulator.heater.cut import Cut
-from thermoctl.regulator.heater.doubt import HeatDoubt, Seen
+from thermoctl.regulator.heater.doubt import HeatDoubt
 from thermoctl.regulator.heater.known import OFF_LAGS, KnownHeater, arrived
 from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S, CREPT_LAGS, Answer
-from thermoctl.regulator.heater.response import Block, Gain, HeatResponse
+from thermoctl.regulator.heater.response import Gain, HeatResponse, Seen
+from thermoctl.regulator.heater.stuck_sensor import StuckSensor
 from thermoctl.regulator.heater.trial import Trial
 from thermoctl.regulator.supervisor import Emit
 
@@ -57,7 +58,7 @@ class HeaterWatch:
         self._unknown_s = max(60.0, 10.0 * period_s)
         self._sign = 1.0 if check.action == "heat" else -1.0
         self._blocks = Blocks(period_s, self._sign)
-        self._repeats = Repeats()
+        self._stuck = StuckSensor()
         self._response, self._doubt, self._climb = HeatResponse(), HeatDoubt(), Climb()
         self._supervisor, self._emit = supervisor, emit
         self._heater, self._trial, self._ceiling = KnownHeater(), Trial(check), Ceiling()
@@ -104,8 +105,8 @@ class HeaterWatch:
             self._lose_track()
             self._trial.begin(self._t_s)
             return
-        if self._repeats.observe(reading_c):
-            text = f"expected readings that differ, got {self._repeats.run + 1} equal ones in a row"
+        if self._stuck.observe(reading_c):
+            text = f"expected readings that differ, got {self._stuck.run + 1} equal ones in a row"
             self._supervisor.fail("sensor.stuck", 4, text, t_s)
         block = self._blocks.add(interval_s, reading_c, applied)
         if block is not None:
