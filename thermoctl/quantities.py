@@ -1,4 +1,4 @@
-"""Units and the few numbers every room shares.
+"""Units, and the few numbers and functions of numbers that every room shares.
 
 A float with a dimension wears it in its name: ``_s`` seconds, ``_c`` degrees Celsius, ``_k`` kelvin
 (a difference), ``_w`` watts, ``_v`` volts. Power is a fraction in [0, 1] and is called ``power``;
@@ -8,7 +8,7 @@ with a cooler beside the heater it goes down to -1.
 from __future__ import annotations
 
 import math
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,24 @@ _NUMBERS = (int, float, np.integer, np.floating)
 
 ZERO_CELSIUS_K = 273.15
 """0 degC in kelvin, exact by definition."""
+
+
+class Uncertain(NamedTuple):
+    """A quantity and its standard deviation, in one unit; NaN where nothing is known."""
+
+    mean: float = math.nan
+    sd: float = math.nan
+
+    def scaled(self, factor: float) -> Uncertain:
+        """Return both times `factor`."""
+        return Uncertain(self.mean * factor, self.sd * abs(factor))
+
+    def over(self, other: Uncertain) -> Uncertain:
+        """Return the quotient of two whose errors are independent."""
+        mean = self.mean / other.mean
+        shares = math.hypot(self.sd / self.mean if self.mean else 0.0, other.sd / other.mean)
+        own = self.sd / abs(other.mean)
+        return Uncertain(mean, abs(mean) * shares if self.mean else own)
 
 
 def is_finite_number(value: Any) -> bool:

@@ -19,8 +19,7 @@ import numpy as np
 
 from thermoctl.insight.harris import autoregression
 from thermoctl.insight.lagging import felt
-from thermoctl.insight.rows import Known
-from thermoctl.quantities import Array
+from thermoctl.quantities import Array, Uncertain
 
 NOISE_ORDER = 40
 """Number of past disturbances in the autoregression of the noise."""
@@ -57,14 +56,14 @@ class Assay:
 
     Parameters
     ----------
-    gain : Known
+    gain : Uncertain
         Heating rate at full power in K/s.
-    slope : Known or None
+    slope : Uncertain or None
         How the loss grows with the temperature, in 1/s; None where that hardly moved.
     """
 
-    gain: Known
-    slope: Known | None = None
+    gain: Uncertain
+    slope: Uncertain | None = None
 
 
 def noise_of(stretch: Stretch, lag_s: float, gain_k_per_s: float) -> Array | None:
@@ -121,5 +120,5 @@ def assay(stretch: Stretch, lag_s: float, whitener: Array) -> Assay | None:
     sd = np.sqrt(np.maximum(np.diag(inverse) * variance, 0.0))
     if not (np.isfinite(theta).all() and np.isfinite(sd).all()):
         return None
-    slope = Known(-float(theta[2]), float(sd[2])) if levels else None
-    return Assay(Known(float(theta[0]), float(sd[0])), slope)
+    slope = Uncertain(-float(theta[2]), float(sd[2])) if levels else None
+    return Assay(Uncertain(float(theta[0]), float(sd[0])), slope)

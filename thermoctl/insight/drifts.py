@@ -13,7 +13,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from thermoctl.insight.changes import Usual
-from thermoctl.insight.rows import Known
+from thermoctl.quantities import Uncertain
 
 SIGMAS = 3.0
 """Standard deviations beyond which there is a drift."""
@@ -28,19 +28,19 @@ RELEASED = 0.5
 class Compared:
     """A quantity when it was learnt, and now."""
 
-    before: Known
-    now: Known
+    before: Uncertain
+    now: Uncertain
 
     @property
     def share(self) -> float:
         """By which share of the value before it grew."""
-        return self.now.value / self.before.value - 1.0 if self.before.value else math.nan
+        return self.now.mean / self.before.mean - 1.0 if self.before.mean else math.nan
 
     @property
     def sigmas(self) -> float:
         """How many standard deviations lie between them; negative where it fell."""
         sd = math.hypot(self.before.sd, self.now.sd)
-        return (self.now.value - self.before.value) / sd if sd > 0.0 else math.nan
+        return (self.now.mean - self.before.mean) / sd if sd > 0.0 else math.nan
 
     def beyond(self, share: float) -> bool:
         """Return whether it moved by `share`, up or down, and out of all error."""
@@ -124,8 +124,8 @@ class Baseline:
         if self._count < self._learnt or len(self._recent) < (self._recent.maxlen or 1):
             return None
         sd = self._usual.sd
-        now = Known(sum(self._recent) / len(self._recent), sd / math.sqrt(len(self._recent)))
-        return Compared(Known(self._mean, sd / math.sqrt(min(self._count, self._memory))), now)
+        now = Uncertain(sum(self._recent) / len(self._recent), sd / math.sqrt(len(self._recent)))
+        return Compared(Uncertain(self._mean, sd / math.sqrt(min(self._count, self._memory))), now)
 
     def _take(self, value: float) -> None:
         self._count += 1

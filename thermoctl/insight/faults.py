@@ -12,9 +12,9 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from thermoctl.insight.drifts import Baseline, Compared, Lasting
-from thermoctl.insight.rows import Known
 from thermoctl.insight.values import Drift
 from thermoctl.insight.wording import plain
+from thermoctl.quantities import Uncertain
 
 ELEMENT, LOSS, WATER, WIRING = "element.weak", "loss.up", "water.low", "wiring.noisy"
 
@@ -48,7 +48,7 @@ class Faults:
         self._active: dict[str, Drift] = {}
         self._more_power, self._more_noise = Lasting(POWER_UP, 2), Lasting(NOISE_UP, 2)
         self._water, self._element = Lasting(GAIN_UP, 1), Lasting(GAIN_DOWN, 1)
-        self._first: Known | None = None
+        self._first: Uncertain | None = None
         self._diluted = 1.0
         self._up_for = 0
         self._noise = Baseline(LEARNT, MEMORY, RECENT)
@@ -69,7 +69,7 @@ class Faults:
         """Take the mean power of a turn at rest, and the noise at its end."""
         compared = self._power.after(power, follow=not self._more_power.stands)
         if compared is not None:
-            least = compared.now.value - compared.before.value > POWER_LEAST
+            least = compared.now.mean - compared.before.mean > POWER_LEAST
             if least or self._more_power.stands:
                 self._more_power.after(compared)
             self._up_for = self._up_for + 1 if self._more_power.stands else 0
@@ -87,7 +87,7 @@ class Faults:
         """Note that cold water may have come in, as a `share` of what was there."""
         self._diluted /= 1.0 + share
 
-    def reckon(self, t_s: float, gain: Known) -> Compared | None:
+    def reckon(self, t_s: float, gain: Uncertain) -> Compared | None:
         """Take the gain of a move; return the comparison if it changed what stands."""
         if self._first is None:
             self._first = gain
@@ -114,14 +114,14 @@ class Faults:
             name,
             since_s,
             words(compared),
-            compared.before.value,
-            compared.now.value,
+            compared.before.mean,
+            compared.now.mean,
             compared.sigmas,
         )
 
 
-def _rough(gain: Known) -> Known:
-    return Known(gain.value, math.hypot(gain.sd, UNLIKE * gain.value / math.sqrt(2.0)))
+def _rough(gain: Uncertain) -> Uncertain:
+    return Uncertain(gain.mean, math.hypot(gain.sd, UNLIKE * gain.mean / math.sqrt(2.0)))
 
 
 def _percent(share: float) -> str:
@@ -129,7 +129,7 @@ def _percent(share: float) -> str:
 
 
 def _loss_words(compared: Compared) -> str:
-    before, now = 100.0 * compared.before.value, 100.0 * compared.now.value
+    before, now = 100.0 * compared.before.mean, 100.0 * compared.now.mean
     return (
         f"{_percent(compared.share)} more power to hold, {plain(now, 1)} % after "
         f"{plain(before, 1)} %: lid off, or a draught; or the element is weak"
@@ -137,12 +137,12 @@ def _loss_words(compared: Compared) -> str:
 
 
 def _noise_words(compared: Compared) -> str:
-    before, now = 1e3 * compared.before.value, 1e3 * compared.now.value
+    before, now = 1e3 * compared.before.mean, 1e3 * compared.now.mean
     return f"noise {plain(now)} mK after {plain(before)} mK: the wiring is noisy"
 
 
 def _water_words(compared: Compared) -> str:
-    left = _percent(compared.before.value / compared.now.value)
+    left = _percent(compared.before.mean / compared.now.mean)
     return f"gain up {_percent(compared.share)}: the water is low, about {left} of it left"
 
 

@@ -76,6 +76,6 @@ class Reckoning:
             if stretch is None or self._whitener is None:
                 continue
             found = assay(stretch, self._lag_s, self._whitener)
-            if found is not None and 0.0 < found.gain.sd < SURE * found.gain.value:
+            if found is not None and 0.0 < found.gain.sd < SURE * found.gain.mean:
                 return found
         return None

@@ -6,11 +6,11 @@ Explained in ``docs/insight.md``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from thermoctl.insight import physics
 from thermoctl.insight.values import Row
 from thermoctl.insight.wording import UNKNOWN, number, plain
+from thermoctl.quantities import Uncertain
 from thermoctl.signals import PlantBelief
 
 NO_HEATER = "heater_w is not configured"
@@ -24,37 +24,18 @@ VAGUE_LAG = 10.0
 """Ratio of the quantiles of a lag from which on it is assumed and not learnt."""
 
 
-@dataclass(frozen=True, slots=True)
-class Known:
-    """A quantity and its standard deviation, in the unit of whoever speaks of it."""
-
-    value: float
-    sd: float
-
-    def scaled(self, factor: float) -> Known:
-        """Return both times `factor`."""
-        return Known(self.value * factor, self.sd * abs(factor))
-
-    def over(self, other: Known) -> Known:
-        """Return the quotient of two that have nothing to do with each other."""
-        value = self.value / other.value
-        shares = math.hypot(self.sd / self.value if self.value else 0.0, other.sd / other.value)
-        own = self.sd / abs(other.value)
-        return Known(value, abs(value) * shares if self.value else own)
+_NOTHING = Uncertain()
 
 
-_NOTHING = Known(math.nan, math.nan)
-
-
-def _sets_apart(gain: Known) -> bool:
+def _sets_apart(gain: Uncertain) -> bool:
     """Return whether the gain differs from none by more than its error; NaN does not."""
-    return abs(gain.value) > _SIGMAS * gain.sd
+    return abs(gain.mean) > _SIGMAS * gain.sd
 
 
 def rows(
     plant: PlantBelief,
-    gain: Known,
-    slope: Known | None = None,
+    gain: Uncertain,
+    slope: Uncertain | None = None,
     heater_w: float | None = None,
 ) -> tuple[Row, ...]:
     """Return the plant in physical words.
@@ -63,9 +44,9 @@ def rows(
     ----------
     plant : PlantBelief
         What is believed now.
-    gain : Known
+    gain : Uncertain
         Heating rate at full power in K/s; of a time at which the power moved.
-    slope : Known, optional
+    slope : Uncertain, optional
         How the loss grows with the temperature, in 1/s.
     heater_w : float, optional
         Rated power of the heater in W.
@@ -76,8 +57,8 @@ def rows(
     of none, a power to hold to `VAGUE_POWER`, a lag to `VAGUE_LAG`.
     """
     gain = gain if _sets_apart(gain) else _NOTHING
-    holding = Known(plant.holding_power, plant.holding_power_sd)
-    loss = Known(plant.loss_k_per_s, plant.loss_sd_k_per_s)
+    holding = Uncertain(plant.holding_power, plant.holding_power_sd)
+    loss = Uncertain(plant.loss_k_per_s, plant.loss_sd_k_per_s)
     if _SIGMAS * holding.sd > VAGUE_POWER:
         holding = loss = _NOTHING
     return (
@@ -106,22 +87,22 @@ def _lag(plant: PlantBelief) -> Row:
 
 
 def _of_heater(
-    gain: Known, holding: Known, slope: Known | None, heater_w: float | None
+    gain: Uncertain, holding: Uncertain, slope: Uncertain | None, heater_w: float | None
 ) -> tuple[Row, ...]:
     """Return the rows that need the rated power of the heater."""
     names = (("volume", "water", "l"), ("loss_w", "loss", "W"), ("loss_w_per_k", "loss", "W/K"))
-    if heater_w is None or not gain.value > 0.0:
-        learnt = NOT_YET if math.isnan(gain.value) else "power cools"
+    if heater_w is None or not gain.mean > 0.0:
+        learnt = NOT_YET if math.isnan(gain.mean) else "power cools"
         why = NO_HEATER if heater_w is None else learnt
         return tuple(_unknown(*each, why) for each in names)
-    one = Known(physics.litres(heater_w), 0.0)
-    capacity = Known(heater_w, 0.0).over(gain)
+    one = Uncertain(physics.litres(heater_w), 0.0)
+    capacity = Uncertain(heater_w, 0.0).over(gain)
     if slope is None:
         per_k = _unknown(*names[2], "the temperature has not moved far enough")
     else:
-        product = capacity.value * slope.value
-        shares = math.hypot(slope.sd / slope.value, capacity.sd / capacity.value)
-        per_k = _row(*names[2][:2], Known(product, product * shares), names[2][2])
+        product = capacity.mean * slope.mean
+        shares = math.hypot(slope.sd / slope.mean, capacity.sd / capacity.mean)
+        per_k = _row(*names[2][:2], Uncertain(product, product * shares), names[2][2])
     return (
         _row("volume", "water", one.over(gain), "l"),
         _row("loss_w", "loss", holding.scaled(heater_w), "W"),
@@ -129,11 +110,11 @@ def _of_heater(
     )
 
 
-def _row(name: str, label: str, known: Known, unit: str) -> Row:
-    if not (math.isfinite(known.value) and math.isfinite(known.sd)):
+def _row(name: str, label: str, known: Uncertain, unit: str) -> Row:
+    if not (math.isfinite(known.mean) and math.isfinite(known.sd)):
         return _unknown(name, label, unit, NOT_YET)
-    text = f"{number(known.value, known.sd)} {unit}"
-    return Row(name, label, known.value, _SIGMAS * known.sd, unit, text)
+    text = f"{number(known.mean, known.sd)} {unit}"
+    return Row(name, label, known.mean, _SIGMAS * known.sd, unit, text)
 
 
 def _unknown(name: str, label: str, unit: str, why: str) -> Row:

@@ -5,44 +5,44 @@ from __future__ import annotations
 from thermoctl.insight import physics
 from thermoctl.insight.changes import Found
 from thermoctl.insight.drifts import Compared
-from thermoctl.insight.rows import Known
 from thermoctl.insight.values import Change
 from thermoctl.insight.wording import number, plain
+from thermoctl.quantities import Uncertain
 
 _SIGMAS = 2.0
 
 
-def change_of(found: Found, gain: Known, heater_w: float | None) -> Change:
+def change_of(found: Found, gain: Uncertain, heater_w: float | None) -> Change:
     """Return a change of the balance as it is told.
 
     Parameters
     ----------
     found : Found
         What was found.
-    gain : Known
+    gain : Uncertain
         Heating rate at full power in K/s.
     heater_w : float or None
         Rated power of the heater in W.
     """
-    capacity = None if heater_w is None else physics.capacity_j_per_k(heater_w, gain.value)
+    capacity = None if heater_w is None else physics.capacity_j_per_k(heater_w, gain.mean)
     if found.step_k is not None and found.step_sd_k is not None:
-        return _step(found, Known(found.step_k, found.step_sd_k), capacity)
-    slope = Known(found.slope_k_per_s or 0.0, found.slope_sd_k_per_s or 0.0)
+        return _step(found, Uncertain(found.step_k, found.step_sd_k), capacity)
+    slope = Uncertain(found.slope_k_per_s or 0.0, found.slope_sd_k_per_s or 0.0)
     return _slope(found.t_s, slope, capacity)
 
 
-def _step(found: Found, step: Known, capacity: float | None) -> Change:
-    fell = step.value < 0.0
-    size = Known(abs(step.value), step.sd)
-    words = f"step {'loss' if fell else 'gain'} of {number(size.value, size.sd)} K"
+def _step(found: Found, step: Uncertain, capacity: float | None) -> Change:
+    fell = step.mean < 0.0
+    size = Uncertain(abs(step.mean), step.sd)
+    words = f"step {'loss' if fell else 'gain'} of {number(size.mean, size.sd)} K"
     heat_j = None
     if capacity is not None:
-        heat_j = capacity * step.value
+        heat_j = capacity * step.mean
         words += f", {plain(abs(heat_j) / 1e3)} kJ"
     if fell:
-        words += _equivalent(size.value, found.before_c, capacity)
+        words += _equivalent(size.mean, found.before_c, capacity)
     kind = "step.loss" if fell else "step.gain"
-    return Change(found.t_s, kind, step.value, _SIGMAS * step.sd, "K", words, heat_j)
+    return Change(found.t_s, kind, step.mean, _SIGMAS * step.sd, "K", words, heat_j)
 
 
 def _equivalent(fall_k: float, before_c: float, capacity: float | None) -> str:
@@ -59,15 +59,15 @@ def _equivalent(fall_k: float, before_c: float, capacity: float | None) -> str:
     return f", about {' or '.join(each)}" if each else ""
 
 
-def _slope(t_s: float, slope: Known, capacity: float | None) -> Change:
-    up = slope.value < 0.0
+def _slope(t_s: float, slope: Uncertain, capacity: float | None) -> Change:
+    up = slope.mean < 0.0
     per_min = slope.scaled(60.0)
-    size = number(abs(per_min.value), per_min.sd)
+    size = number(abs(per_min.mean), per_min.sd)
     words = f"loss {'up' if up else 'down'} by {size} K/min"
     if capacity is not None:
-        words += f", {plain(abs(slope.value) * capacity)} W"
+        words += f", {plain(abs(slope.mean) * capacity)} W"
     kind = "loss.up" if up else "loss.down"
-    return Change(t_s, kind, per_min.value, _SIGMAS * per_min.sd, "K/min", words)
+    return Change(t_s, kind, per_min.mean, _SIGMAS * per_min.sd, "K/min", words)
 
 
 def change_of_gain(t_s: float, compared: Compared) -> Change:
@@ -81,7 +81,7 @@ def change_of_gain(t_s: float, compared: Compared) -> Change:
         The gain before and now.
     """
     share = 100.0 * compared.share
-    sd = 100.0 * abs(compared.now.value / compared.before.value) * _relative_sd(compared)
+    sd = 100.0 * abs(compared.now.mean / compared.before.mean) * _relative_sd(compared)
     way = "up" if share > 0.0 else "down"
     words = f"gain {way} by {number(abs(share), sd)} %, seen when the loop was moved"
     return Change(t_s, f"gain.{way}", share, _SIGMAS * sd, "%", words)
@@ -89,7 +89,7 @@ def change_of_gain(t_s: float, compared: Compared) -> Change:
 
 def _relative_sd(compared: Compared) -> float:
     before, now = compared.before, compared.now
-    return float(((before.sd / before.value) ** 2 + (now.sd / now.value) ** 2) ** 0.5)
+    return float(((before.sd / before.mean) ** 2 + (now.sd / now.mean) ** 2) ** 0.5)
 
 
 def dilution(found: Found) -> float:

@@ -17,11 +17,12 @@ from thermoctl.insight.performance import PerformanceWatch
 from thermoctl.insight.reckoning import Reckoning
 from thermoctl.insight.rest import Rest
 from thermoctl.insight.restless import Restless
-from thermoctl.insight.rows import Known, rows
+from thermoctl.insight.rows import rows
 from thermoctl.insight.samples import Samples
 from thermoctl.insight.told import change_of, change_of_gain, dilution, jump_at
 from thermoctl.insight.values import Change, Drift, Insight
 from thermoctl.insight.witness import Witness
+from thermoctl.quantities import Uncertain
 from thermoctl.signals import Event, Mode, PlantBelief, Quality, State, Step
 
 CHANGES = 10
@@ -76,7 +77,7 @@ class Insights:
         self._restless = Restless()
         self._faults = Faults()
         self._samples = Samples(period_s)
-        self._known: _Known | None = None
+        self._known: _WatchedPlant | None = None
         self._changes: deque[Change] = deque(maxlen=CHANGES)
         self._applied, self._power = 0.0, _Turn()
         self._rows_due_s = self._jumped_s = -math.inf
@@ -133,7 +134,7 @@ class Insights:
         reading_c = step.measurement.temperature_c if good else math.nan
         self._samples.take(step.t_s, reading_c, applied, plant.lag_s)
         known = self._known_after(step, plant)
-        gain_k_per_s = plant.gain_k_per_s if known is None else known.gain.value
+        gain_k_per_s = plant.gain_k_per_s if known is None else known.gain.mean
         if self._performance.now.index is None and self._rest.lasts_s(step.t_s) < CALM_S:
             self._judge_unrest(step, plant.lag_s, gain_k_per_s)
         if known is None:
@@ -153,7 +154,7 @@ class Insights:
         if good and self._rest.lasts_s(step.t_s) > 0.0 and not known.changes.busy:
             self._at_rest(step, plant, reading_c, gain_k_per_s)
 
-    def _known_after(self, step: Step, plant: PlantBelief) -> _Known | None:
+    def _known_after(self, step: Step, plant: PlantBelief) -> _WatchedPlant | None:
         """Return what is known of the plant, which begins when the loop is first at rest."""
         if self._known is not None and not self._known.outlived(step.t_s, plant.lag_s):
             return self._known
@@ -161,7 +162,7 @@ class Insights:
         sure = 0.0 < plant.gain_sd_k_per_s < SURE * abs(plant.gain_k_per_s)
         settled = sure and self._rest.lasts_s(step.t_s) >= settled_s
         self._known = (
-            _Known(self._period_s, plant, self._samples, self._applied) if settled else None
+            _WatchedPlant(self._period_s, plant, self._samples, self._applied) if settled else None
         )
         return self._known
 
@@ -194,14 +195,14 @@ class Insights:
         if mean is not None:
             self._faults.turn(step.t_s, mean, plant.noise_sd_k)
 
-    def _found(self, known: _Known, t_s: float, found: Found) -> None:
+    def _found(self, known: _WatchedPlant, t_s: float, found: Found) -> None:
         self._changes.appendleft(change_of(found, known.gain, self._given_w()))
         known.reckoning.disturb(t_s)
         self._power = _Turn()
         if found.step_k is not None:
             self._faults.add_cold(dilution(found))
 
-    def _jumped(self, known: _Known, t_s: float) -> None:
+    def _jumped(self, known: _WatchedPlant, t_s: float) -> None:
         """Date a jump that nobody can measure, because the loop was moved as well."""
         first = t_s - self._jumped_s > known.lag_s * SETTLED_LAGS
         self._jumped_s = t_s
@@ -209,7 +210,7 @@ class Insights:
         if first and moving and not known.changes.busy:
             self._changes.appendleft(jump_at(t_s))
 
-    def _assayed(self, known: _Known, t_s: float, found: Assay) -> None:
+    def _assayed(self, known: _WatchedPlant, t_s: float, found: Assay) -> None:
         compared = self._faults.reckon(t_s, found.gain)
         known.take(found, self._applied)
         if compared is not None:
@@ -223,7 +224,7 @@ class Insights:
         known, told = self._known, self._now.rows
         if step.t_s >= self._rows_due_s:
             self._rows_due_s = step.t_s + ROWS_S
-            gain = Known(plant.gain_k_per_s, plant.gain_sd_k_per_s)
+            gain = Uncertain(plant.gain_k_per_s, plant.gain_sd_k_per_s)
             told = rows(
                 plant,
                 gain if known is None else known.gain,
@@ -295,16 +296,16 @@ class _Turn:
         return mean
 
 
-class _Known:
+class _WatchedPlant:
     """A plant that can be watched: its lag and gain, and who watches with them."""
 
     def __init__(self, period_s: float, plant: PlantBelief, samples: Samples, power: float) -> None:
         self._period_s, self.lag_s = period_s, plant.lag_s
-        self.gain = Known(plant.gain_k_per_s, plant.gain_sd_k_per_s)
-        self.slope: Known | None = None
+        self.gain = Uncertain(plant.gain_k_per_s, plant.gain_sd_k_per_s)
+        self.slope: Uncertain | None = None
         self._alike_s = math.nan
-        self.reckoning = Reckoning(self.lag_s, self.gain.value, samples)
-        self.changes = ChangeWatch(period_s, self.lag_s, self.gain.value, power)
+        self.reckoning = Reckoning(self.lag_s, self.gain.mean, samples)
+        self.changes = ChangeWatch(period_s, self.lag_s, self.gain.mean, power)
 
     def outlived(self, t_s: float, lag_s: float) -> bool:
         """Return whether the plant has another lag by now, and not just for a while."""
@@ -315,5 +316,5 @@ class _Known:
     def take(self, found: Assay, power: float) -> None:
         """Take over a gain that was assayed on a move."""
         self.gain, self.slope = found.gain, found.slope or self.slope
-        if not 1.0 / GAIN_MOVED <= self.gain.value / self.changes.gain_k_per_s <= GAIN_MOVED:
-            self.changes = ChangeWatch(self._period_s, self.lag_s, self.gain.value, power)
+        if not 1.0 / GAIN_MOVED <= self.gain.mean / self.changes.gain_k_per_s <= GAIN_MOVED:
+            self.changes = ChangeWatch(self._period_s, self.lag_s, self.gain.mean, power)

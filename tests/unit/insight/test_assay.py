@@ -37,14 +37,14 @@ def a_move(samples=900):
 def test_a_move_tells_the_gain_within_its_error(seed):
     whitener = noise_of(at_rest(), LAG_S, GAIN)
     found = assay(vessel(a_move(), seed), LAG_S, whitener)
-    assert found.gain.value == pytest.approx(GAIN, abs=4.0 * found.gain.sd)
+    assert found.gain.mean == pytest.approx(GAIN, abs=4.0 * found.gain.sd)
     assert found.gain.sd < 0.03 * GAIN
 
 
 def test_a_slower_clock_changes_nothing():
     whitener = noise_of(at_rest(period_s=2.0), LAG_S, GAIN)
     found = assay(vessel(a_move(), 1, period_s=2.0), LAG_S, whitener)
-    assert found.gain.value == pytest.approx(GAIN, abs=4.0 * found.gain.sd)
+    assert found.gain.mean == pytest.approx(GAIN, abs=4.0 * found.gain.sd)
 
 
 def test_how_the_loss_grows_is_told_only_where_the_temperature_moved():
@@ -52,13 +52,13 @@ def test_how_the_loss_grows_is_told_only_where_the_temperature_moved():
     quiet = assay(vessel(np.full(900, 0.2), 2), LAG_S, whitener)
     moved = assay(vessel(a_move(), 2, slope=1e-3), LAG_S, whitener)
     assert quiet.slope is None
-    assert moved.slope.value == pytest.approx(1e-3, abs=4.0 * moved.slope.sd)
+    assert moved.slope.mean == pytest.approx(1e-3, abs=4.0 * moved.slope.sd)
 
 
 def test_a_power_that_rests_says_nothing_of_the_gain():
     whitener = noise_of(at_rest(), LAG_S, GAIN)
     found = assay(vessel(np.full(900, 0.2), 3), LAG_S, whitener)
-    assert found is None or not found.gain.sd < 0.1 * abs(found.gain.value)
+    assert found is None or not found.gain.sd < 0.1 * abs(found.gain.mean)
 
 
 def test_too_short_a_stretch_says_nothing():

@@ -7,7 +7,7 @@ import pytest
 
 from thermoctl.insight.drifts import Baseline, Compared, Lasting
 from thermoctl.insight.faults import ELEMENT, LOSS, NORMAL_AFTER, WATER, WIRING, Faults
-from thermoctl.insight.rows import Known
+from thermoctl.quantities import Uncertain
 
 
 def turned(powers, noises=None):
@@ -60,7 +60,7 @@ def test_noise_that_doubled_is_named():
 def gains(*values, diluted=0.0):
     faults = Faults()
     faults.add_cold(diluted)
-    told = [faults.reckon(float(k), Known(each, 0.01 * each)) for k, each in enumerate(values)]
+    told = [faults.reckon(float(k), Uncertain(each, 0.01 * each)) for k, each in enumerate(values)]
     return faults, told
 
 
@@ -92,19 +92,19 @@ def test_a_gain_within_what_two_moves_differ_by_is_no_news():
 def test_a_weak_element_explains_the_power_to_hold():
     faults = turned(around(0.19, 12) + around(0.26, 4))
     for value in (0.044, 0.031):
-        faults.reckon(5000.0, Known(value, 0.01 * value))
+        faults.reckon(5000.0, Uncertain(value, 0.01 * value))
     assert set(faults.active) == {ELEMENT}
 
 
 def test_a_large_drift_within_its_own_error_is_none():
-    assert not Compared(Known(1.0, 0.3), Known(1.5, 0.3)).beyond(0.2)
-    assert Compared(Known(1.0, 0.05), Known(1.5, 0.05)).beyond(0.2)
-    assert Compared(Known(1.0, 0.05), Known(0.5, 0.05)).beyond(-0.2)
+    assert not Compared(Uncertain(1.0, 0.3), Uncertain(1.5, 0.3)).beyond(0.2)
+    assert Compared(Uncertain(1.0, 0.05), Uncertain(1.5, 0.05)).beyond(0.2)
+    assert Compared(Uncertain(1.0, 0.05), Uncertain(0.5, 0.05)).beyond(-0.2)
 
 
 def test_a_condition_between_beginning_and_ending_stays_what_it_is():
-    lasting, half = Lasting(0.2, 2), Compared(Known(1.0, 0.01), Known(1.15, 0.01))
-    full = Compared(Known(1.0, 0.01), Known(1.3, 0.01))
+    lasting, half = Lasting(0.2, 2), Compared(Uncertain(1.0, 0.01), Uncertain(1.15, 0.01))
+    full = Compared(Uncertain(1.0, 0.01), Uncertain(1.3, 0.01))
     assert [lasting.after(each) for each in (half, half, full, full)] == [False, False, False, True]
     assert [lasting.after(half) for _ in range(5)] == [False] * 5
     assert lasting.stands
@@ -116,5 +116,5 @@ def test_a_baseline_that_is_not_to_follow_stays():
         baseline.after(each)
     for _ in range(50):
         compared = baseline.after(2.0, follow=False)
-    assert compared.before.value == pytest.approx(1.0, rel=0.03)
-    assert compared.now.value == 2.0
+    assert compared.before.mean == pytest.approx(1.0, rel=0.03)
+    assert compared.now.mean == 2.0

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from thermoctl.insight.rows import Known, rows
+from thermoctl.insight.rows import rows
+from thermoctl.quantities import Uncertain
 from thermoctl.signals import PlantBelief
 
 PLANT = PlantBelief(
@@ -15,7 +16,7 @@ PLANT = PlantBelief(
     learning=False,
     jumped=False,
 )
-GAIN = Known(0.044, 0.001)
+GAIN = Uncertain(0.044, 0.001)
 
 
 def named(*args, **more):
@@ -42,7 +43,7 @@ def test_a_heater_that_is_known_makes_litres_and_watts_of_it():
 
 
 def test_the_slope_of_the_loss_is_watts_per_kelvin():
-    row = named(PLANT, GAIN, Known(3e-4, 3e-5), 1500.0)["loss_w_per_k"]
+    row = named(PLANT, GAIN, Uncertain(3e-4, 3e-5), 1500.0)["loss_w_per_k"]
     assert row.value == pytest.approx(1500.0 / 0.044 * 3e-4)
     assert row.error / row.value == pytest.approx(2.0 * math.hypot(0.1, 0.001 / 0.044))
 
@@ -60,7 +61,7 @@ def test_a_loss_of_nothing_keeps_its_error():
 
 
 def test_what_is_no_number_is_not_known():
-    row = named(PLANT, Known(math.nan, 0.1))["gain"]
+    row = named(PLANT, Uncertain(math.nan, 0.1))["gain"]
     assert row.value is None
     assert row.text.startswith("–")
 
@@ -68,13 +69,13 @@ def test_what_is_no_number_is_not_known():
 @pytest.mark.parametrize(
     ("vague", "names"),
     [
-        ({"gain": Known(0.01, 0.005)}, ["gain", "volume", "loss_w", "loss_w_per_k"]),
+        ({"gain": Uncertain(0.01, 0.005)}, ["gain", "volume", "loss_w", "loss_w_per_k"]),
         ({"holding_power_sd": 0.3}, ["loss", "holding_power", "loss_w"]),
         ({"lag_low_s": 3.0, "lag_high_s": 139.0}, ["lag"]),
     ],
 )
 def test_what_has_not_been_learnt_yet_is_a_dash_with_the_reason(vague, names):
     gain = vague.pop("gain", GAIN)
-    told = named(replace(PLANT, **vague), gain, Known(3e-4, 3e-5), heater_w=1500.0)
+    told = named(replace(PLANT, **vague), gain, Uncertain(3e-4, 3e-5), heater_w=1500.0)
     assert {name for name, row in told.items() if row.value is None} == set(names)
     assert {told[name].text for name in names} == {"– not known yet"}

@@ -7,10 +7,10 @@ import pytest
 
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
+from thermoctl.quantities import Uncertain
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.balance.feasible import Feasibility, Wanted
 from thermoctl.regulator.balance.foretold import Settling, Slip
-from thermoctl.regulator.balance.heat_belief import Known
 from thermoctl.regulator.guard import Failure
 from thermoctl.signals import Feasible, Measurement, Mode
 
@@ -99,28 +99,28 @@ def test_what_cannot_be_reckoned_with_is_forgotten_and_said_once():
 def test_an_arrival_that_does_not_come_nearer_is_doubted_by_as_much_as_it_is_late():
     slip = Slip()
     for t_s in range(0, 110, 10):
-        told = slip.doubted(Known(20.0, 5.0), 40.0, float(t_s))
+        told = slip.doubted(Uncertain(20.0, 5.0), 40.0, float(t_s))
     assert told.mean == 20.0
     assert 80.0 < told.sd < 101.0
-    assert slip.doubted(Known(20.0, 5.0), 41.0, 110.0).sd == 5.0
+    assert slip.doubted(Uncertain(20.0, 5.0), 41.0, 110.0).sd == 5.0
 
 
 def test_an_arrival_that_comes_as_told_is_not_doubted():
     slip = Slip()
     for t_s in range(0, 100, 10):
-        told = slip.doubted(Known(100.0 - t_s, 5.0), 40.0, float(t_s))
+        told = slip.doubted(Uncertain(100.0 - t_s, 5.0), 40.0, float(t_s))
         assert told.sd == 5.0
-    assert slip.doubted(Known(0.0, 0.0), 40.0, 100.0) == Known(0.0, 0.0)
+    assert slip.doubted(Uncertain(0.0, 0.0), 40.0, 100.0) == Uncertain(0.0, 0.0)
 
 
 def test_a_holding_power_that_moves_is_known_no_better_than_it_moved():
     settling = Settling()
-    settling.doubted(Known(0.6, 0.01), 40.0, 0.0)
-    assert settling.doubted(Known(0.4, 0.01), 40.0, 10.0).sd == pytest.approx(0.2, rel=0.05)
+    settling.doubted(Uncertain(0.6, 0.01), 40.0, 0.0)
+    assert settling.doubted(Uncertain(0.4, 0.01), 40.0, 10.0).sd == pytest.approx(0.2, rel=0.05)
     for t_s in range(20, 6000, 10):
-        told = settling.doubted(Known(0.4, 0.01), 40.0, float(t_s))
+        told = settling.doubted(Uncertain(0.4, 0.01), 40.0, float(t_s))
     assert told.sd == pytest.approx(0.01, rel=0.01)
-    assert settling.doubted(Known(0.7, 0.01), 60.0, 6000.0).sd == 0.01
+    assert settling.doubted(Uncertain(0.7, 0.01), 60.0, 6000.0).sd == 0.01
 
 
 def test_a_balance_that_raises_costs_the_loop_neither_its_step_nor_its_heat(monkeypatch):

@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
+from thermoctl.quantities import Uncertain
 from thermoctl.regulator.balance import heat_loss
-from thermoctl.regulator.balance.heat_belief import Known
 from thermoctl.regulator.balance.heat_loss import Stretch
 
 SPAN_S = 10.0
 REST_C, SLOPE, GAIN = 15.0, 2e-4, 0.02
 NOISE_K = 0.005
-AT_ONCE = Known(0.0, 0.0)
+AT_ONCE = Uncertain(0.0, 0.0)
 
 
 class Water:

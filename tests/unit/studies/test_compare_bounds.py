@@ -20,7 +20,7 @@ from thermoctl.studies.compare.play import play
 from thermoctl.studies.compare.riccati import regulated, riccati
 from thermoctl.studies.compare.scenarios import SCENARIOS
 from thermoctl.studies.compare.score import measured
-from thermoctl.studies.compare.swift import Known
+from thermoctl.studies.compare.swift import NoiselessTank
 
 pytestmark = pytest.mark.slow  # together more than the quick subset can afford
 
@@ -29,7 +29,7 @@ NOMINAL = Plant("rig", 0, RIG)
 
 
 def test_a_tank_at_rest_stays_there():
-    held, known = rest(RIG, 37.5), Known.of(RIG)
+    held, known = rest(RIG, 37.5), NoiselessTank.of(RIG)
     heat = held.heat
     for _ in range(60):
         heat = known.advance(heat, held.power)
@@ -39,7 +39,7 @@ def test_a_tank_at_rest_stays_there():
 
 
 def test_a_little_more_power_does_to_the_linear_tank_what_it_does_to_the_tank():
-    held, known = rest(RIG, 37.5), Known.of(RIG)
+    held, known = rest(RIG, 37.5), NoiselessTank.of(RIG)
     linear = linear_tank(RIG, ACQUISITION, held)
     x, more, less = np.zeros((len(linear.A), 1)), held.heat, held.heat
     for _ in range(120):

@@ -9,10 +9,10 @@ import pytest
 from thermoctl.plant import handling, thermal
 from thermoctl.plant.parameters import TankParameters
 from thermoctl.studies.compare.linear import rest
-from thermoctl.studies.compare.swift import Known, swiftest
+from thermoctl.studies.compare.swift import NoiselessTank, swiftest
 
 RIG = TankParameters()
-KNOWN = Known.of(RIG)
+KNOWN = NoiselessTank.of(RIG)
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from thermoctl.quantities import clamp
+from thermoctl.quantities import Uncertain, clamp
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.balance import heat_loss
 from thermoctl.regulator.balance.foretold import Nearing, Settling, Slip
-from thermoctl.regulator.balance.heat_belief import HeatBelief, Known, T
+from thermoctl.regulator.balance.heat_belief import HeatBelief, T
 from thermoctl.regulator.balance.heat_loss import Stretch
 from thermoctl.regulator.balance.left_alone import PATIENCE_S, Beyond, LeftAlone
 from thermoctl.regulator.guard import Failure
@@ -261,17 +261,17 @@ class Feasibility:
         highest = _within(heat_loss.reach(belief, wanted.power_max), SD_MOST_K)
         self._nearing.seen(highest, math.copysign(1.0, belief.gain), t_s)
         if wanted.beyond_ceiling:
-            highest = Known(wanted.ceiling_c, ARRIVED_K)
+            highest = Uncertain(wanted.ceiling_c, ARRIVED_K)
         arrival = self._slip.doubted(self._arrival(belief, wanted, holding), wanted.setpoint_c, t_s)
         arrival = _within(arrival, arrival.mean + self._lag_s)
         return Feasible(*_within(holding, POWER_SD_MOST), *highest, *arrival)
 
-    def _arrival(self, belief: HeatBelief, wanted: Wanted, holding: Known) -> Known:
+    def _arrival(self, belief: HeatBelief, wanted: Wanted, holding: Uncertain) -> Uncertain:
         """Return how long it takes with all power there is, and none at the end."""
         way_k = wanted.setpoint_c - self._reading_c
         left_k = abs(way_k)
         if left_k <= ARRIVED_K:
-            return Known(0.0, 0.0)
+            return Uncertain(0.0, 0.0)
         setpoint_c = wanted.setpoint_c - math.copysign(ARRIVED_K, way_k)
         gain, lag_s = belief.gain, self._lag_s
         held = clamp(holding.mean, 0.0, wanted.power_max)
@@ -282,12 +282,12 @@ class Feasibility:
         if abs(setpoint_c - coasting_c) <= ARRIVED_K:
             last_k = left_k
         rest_s = REST_SHARE * lag_s * math.log(max(1.0, last_k / ARRIVED_K))
-        rest = Known(rest_s, LAG_DOUBT * (rest_s + lag_s))
+        rest = Uncertain(rest_s, LAG_DOUBT * (rest_s + lag_s))
         if abs(setpoint_c - coasting_c) <= ARRIVED_K:
             return rest
         arrival = heat_loss.arrival(belief, coasting_c, setpoint_c, power, rest)
         slower = wanted.ramp_s > arrival.mean
-        return Known(wanted.ramp_s, LAG_DOUBT * lag_s) if slower else arrival
+        return Uncertain(wanted.ramp_s, LAG_DOUBT * lag_s) if slower else arrival
 
     def _driven_sds(self, belief: HeatBelief, wanted: Wanted, none: bool) -> float:
         """Return by how many standard deviations a plant without power is driven.
@@ -338,9 +338,9 @@ class Feasibility:
                 self._alarms.clear(code)
 
 
-def _within(known: Known, sd_most: float) -> Known:
+def _within(known: Uncertain, sd_most: float) -> Uncertain:
     """Return what is known, or nothing where it is too vague to be told."""
-    return known if known.sd <= sd_most else Known()
+    return known if known.sd <= sd_most else Uncertain()
 
 
 def _missing_sds(belief: HeatBelief, wanted: Wanted, full: bool) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from thermoctl.regulator.balance.heat_belief import Known
+from thermoctl.quantities import Uncertain
 
 SLIPS_S, SETTLES_S, NEARS_S = 600.0, 600.0, 1800.0
 """Time constants in s with which past values are forgotten: of how late an arrival was, of the
@@ -34,7 +34,7 @@ class Slip:
         self._setpoint_c = self._due_s = self._told_s = math.nan
         self._late_s = 0.0
 
-    def doubted(self, arrival: Known, setpoint_c: float, t_s: float) -> Known:
+    def doubted(self, arrival: Uncertain, setpoint_c: float, t_s: float) -> Uncertain:
         """Return an arrival forecast at `t_s`, in doubt by the errors of earlier ones."""
         if setpoint_c != self._setpoint_c:
             self._setpoint_c, self._due_s, self._late_s = setpoint_c, math.nan, 0.0
@@ -44,7 +44,7 @@ class Slip:
         if not there and math.isfinite(due_s - self._due_s):
             self._late_s = max(0.0, self._late_s + due_s - self._due_s)
         self._due_s, self._told_s = math.nan if there else due_s, t_s
-        return arrival if there else Known(arrival.mean, math.hypot(arrival.sd, self._late_s))
+        return arrival if there else Uncertain(arrival.mean, math.hypot(arrival.sd, self._late_s))
 
 
 class Settling:
@@ -56,7 +56,7 @@ class Settling:
     def __init__(self) -> None:
         self._setpoint_c = self._told_s = self._before = math.nan
 
-    def doubted(self, holding: Known, setpoint_c: float, t_s: float) -> Known:
+    def doubted(self, holding: Uncertain, setpoint_c: float, t_s: float) -> Uncertain:
         """Return a holding power told at `t_s`, in doubt by its changes of late."""
         if not math.isfinite(holding.mean):
             return holding
@@ -66,7 +66,7 @@ class Settling:
             keep = math.exp((self._told_s - t_s) / SETTLES_S)
             self._before = holding.mean + keep * (self._before - holding.mean)
         self._told_s = t_s
-        return Known(holding.mean, math.hypot(holding.sd, holding.mean - self._before))
+        return Uncertain(holding.mean, math.hypot(holding.sd, holding.mean - self._before))
 
 
 class Nearing:
@@ -84,11 +84,11 @@ class Nearing:
     def clear(self) -> None:
         """Begin anew."""
         self._sign = self._told_s = math.nan
-        self._here = self._past = Known()
+        self._here = self._past = Uncertain()
         self._sure = self._sure_past = math.nan
         self._moves = False
 
-    def seen(self, farthest: Known, sign: float, t_s: float) -> None:
+    def seen(self, farthest: Uncertain, sign: float, t_s: float) -> None:
         """Take in the farthest that power holds, told at `t_s`.
 
         Power drives in the direction `sign`.
@@ -102,12 +102,12 @@ class Nearing:
             self._sign, self._told_s, self._sure, self._sure_past = sign, t_s, sure, sure
         past, keep = self._past, math.exp((self._told_s - t_s) / NEARS_S)
         if here >= past.mean:
-            self._past = Known(here + keep * (past.mean - here), sd + keep * (past.sd - sd))
+            self._past = Uncertain(here + keep * (past.mean - here), sd + keep * (past.sd - sd))
         else:  # it was never as near as was thought, or is seen for the first time
-            self._past = Known(here, sd)
+            self._past = Uncertain(here, sd)
         self._sure = max(self._sure, sure)
         self._sure_past = self._sure + keep * (self._sure_past - self._sure)
-        self._here, self._told_s = Known(here, sd), t_s
+        self._here, self._told_s = Uncertain(here, sd), t_s
 
     def arrives(self, setpoint_c: float) -> bool:
         """Return whether it comes to `setpoint_c` within a day, as it has moved of late.

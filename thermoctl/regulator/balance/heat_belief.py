@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from thermoctl.filling import quickly_filled
 
@@ -18,13 +17,6 @@ WARMS_AT_MOST_K = 500.0
 """Largest rise in K above rest that full power holds; it bounds the slope from below."""
 R_FIRST = 4e-4
 """Variance in K² of the mean reading of a stretch, before there was one."""
-
-
-class Known(NamedTuple):
-    """A number with its standard deviation; NaN where nothing is known."""
-
-    mean: float = math.nan
-    sd: float = math.nan
 
 
 @quickly_filled

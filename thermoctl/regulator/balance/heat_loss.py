@@ -26,6 +26,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from thermoctl.quantities import Uncertain
 from thermoctl.regulator.balance.heat_belief import (
     BETA,
     WARMS_AT_MOST_K,
@@ -33,7 +34,6 @@ from thermoctl.regulator.balance.heat_belief import (
     G,
     HeatBelief,
     K,
-    Known,
     Row,
     T,
 )
@@ -222,14 +222,14 @@ def _noise(belief: HeatBelief, y: float) -> float:
 
 def spare(
     belief: HeatBelief, at_c: float, power: float, ahead_k: float = 0.0, *, straight: bool = False
-) -> Known:
+) -> Uncertain:
     """Return how fast `power` would still warm the plant at `at_c`, in K/s.
 
     Its walls are colder by `ahead_k`: 0 once it has been there for long. With a `straight` loss,
     that is at least as much as with one that bends.
     """
     mean = _spare_mean(belief, at_c, power, ahead_k, straight=straight)
-    return Known(mean, _spare_sd(belief, at_c, power, ahead_k, straight=straight))
+    return Uncertain(mean, _spare_sd(belief, at_c, power, ahead_k, straight=straight))
 
 
 def _spare_mean(
@@ -253,22 +253,22 @@ def _spare_sd(
     return math.sqrt(variance + ((BEND_SD * bent) ** 2 + taken * taken))
 
 
-def holding(belief: HeatBelief, at_c: float) -> Known:
+def holding(belief: HeatBelief, at_c: float) -> Uncertain:
     """Return the power that holds `at_c`, not limited to what there is."""
     if not belief.gain_known:
-        return Known()
+        return Uncertain()
     beta = belief.gain
     power = -_spare_mean(belief, at_c, 0.0) / beta
-    return Known(power, _spare_sd(belief, at_c, power) / abs(beta))
+    return Uncertain(power, _spare_sd(belief, at_c, power) / abs(beta))
 
 
-def reach(belief: HeatBelief, power: float) -> Known:
+def reach(belief: HeatBelief, power: float) -> Uncertain:
     """Return the temperature at which `power` keeps the plant for good, in degC.
 
     Far away the errors are not symmetric, and the standard deviation is that of the farther side.
     """
     if not belief.gain_known:
-        return Known()
+        return Uncertain()
     now_c, steep = belief.x[T], belief.slope
     rate = _spare_mean(belief, now_c, power)
     rise_k = _bent(rate / steep)
@@ -279,7 +279,7 @@ def reach(belief: HeatBelief, power: float) -> Known:
         there_sd / (steep * (1.0 + BEND * max(rise_k, 0.0))),
         abs(_bent(rate / flatter) - rise_k),
     )
-    return Known(now_c + rise_k, sd_k)
+    return Uncertain(now_c + rise_k, sd_k)
 
 
 def _bent(straight_k: float) -> float:
@@ -292,7 +292,9 @@ def _bent(straight_k: float) -> float:
     return (math.sqrt(1.0 + 2.0 * BEND * straight_k) - 1.0) / BEND
 
 
-def arrival(belief: HeatBelief, from_c: float, to_c: float, power: float, rest: Known) -> Known:
+def arrival(
+    belief: HeatBelief, from_c: float, to_c: float, power: float, rest: Uncertain
+) -> Uncertain:
     """Return when the plant comes to rest at `to_c`, in s from now.
 
     Parameters
@@ -305,7 +307,7 @@ def arrival(belief: HeatBelief, from_c: float, to_c: float, power: float, rest: 
         Where it shall come to rest.
     power : float
         Power until the last moment, holding power from then on.
-    rest : Known
+    rest : Uncertain
         How long the heat that is under way then takes to arrive.
     """
     way_k, ahead_k = to_c - from_c, belief.ahead_k
@@ -314,7 +316,7 @@ def arrival(belief: HeatBelief, from_c: float, to_c: float, power: float, rest: 
     end = spare(belief, to_c, power, then_k)
     slow = min(begin.mean * way_k, end.mean * way_k)
     if not (belief.gain_known and slow > 0.0):
-        return Known()
+        return Uncertain()
     falling = math.log(begin.mean / end.mean)
     steep = (begin.mean - end.mean) / way_k  # of the chord, so that the bend counts
     straight = abs(falling) < 1e-6
@@ -327,7 +329,7 @@ def arrival(belief: HeatBelief, from_c: float, to_c: float, power: float, rest: 
     variance += (by_slope * 0.5 * BEND_SD * belief.slope * way_k) ** 2
     wander_s = WANDER * belief.gain / begin.mean * math.sqrt(time_s)
     more_s = math.hypot(wander_s, NEARLY_K / end.mean, rest.sd)
-    return Known(time_s + rest.mean, math.hypot(math.sqrt(variance), more_s))
+    return Uncertain(time_s + rest.mean, math.hypot(math.sqrt(variance), more_s))
 
 
 def _ahead(ahead_k: float, way_k: float, rate: float) -> float:

@@ -13,7 +13,7 @@ from thermoctl.studies.compare.linear import linear_tank, rest
 from thermoctl.studies.compare.plants import Plant
 from thermoctl.studies.compare.riccati import Linear, Spread, regulated
 from thermoctl.studies.compare.scenarios import SETPOINT, Happening, Scenario
-from thermoctl.studies.compare.swift import H, Known, Steppable, swiftest
+from thermoctl.studies.compare.swift import H, NoiselessTank, Steppable, swiftest
 
 CHEAP = 1e-9
 """Price of the input that is as good as none, in K² per power squared."""
@@ -49,7 +49,7 @@ def bounds(plant: Plant, scenario: Scenario, period_s: float = 1.0) -> dict[str,
         begin = _begin_lab(parameters, plant.held_c, scenario)
         return _approach(KnownLab(parameters, period_s), begin, plant, scenario)
     heat = _begin(parameters, plant.held_c, scenario)
-    return _approach(Known.of(parameters, period_s), heat, plant, scenario)
+    return _approach(NoiselessTank.of(parameters, period_s), heat, plant, scenario)
 
 
 def _approach(

@@ -42,7 +42,7 @@ class Steppable(Protocol[H]):
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class NoiselessTank:
     """A tank without noise, stepped as the simulated one is.
 
     Parameters
@@ -60,7 +60,7 @@ class Known:
     period_s: float = 1.0
 
     @classmethod
-    def of(cls, parameters: TankParameters, period_s: float = 1.0) -> Known:
+    def of(cls, parameters: TankParameters, period_s: float = 1.0) -> NoiselessTank:
         """Return the tank of `parameters`."""
         return cls(thermal.conductances(parameters), parameters.element.rated_w, period_s)
 
