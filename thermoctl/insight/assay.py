@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermoctl.insight.harris import autoregression
-from thermoctl.insight.lagging import felt
+from thermoctl.insight.lagged_power import felt
 from thermoctl.quantities import Array, Uncertain
 
 NOISE_ORDER = 40

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from thermoctl.insight.lagging import Lagging
+from thermoctl.insight.lagged_power import LaggedPower
 from thermoctl.quantities import Array
 
 SPAN_S, SPAN_LAGS = 60.0, 4.0
@@ -164,7 +164,7 @@ class ChangeWatch:
         span_s = max(SPAN_S, SPAN_LAGS * lag_s)
         self.lag_s, self.gain_k_per_s = lag_s, gain_k_per_s
         self._period_s = period_s
-        self._lagging = Lagging(lag_s, period_s, power)
+        self._lagging = LaggedPower(lag_s, period_s, power)
         self._blocks = _Blocks(max(1, round(span_s / BLOCKS / period_s)))
         self._block_s = self._blocks.size * period_s
         self._usual = {1: Usual(60 * BLOCKS), LONG: Usual(60 * BLOCKS)}

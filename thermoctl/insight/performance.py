@@ -11,7 +11,7 @@ from collections import deque
 import numpy as np
 
 from thermoctl.insight.harris import Harris, autocorrelation, harris
-from thermoctl.insight.lagging import DEAD
+from thermoctl.insight.lagged_power import DEAD
 from thermoctl.insight.swing import Swing, swing_of
 from thermoctl.insight.values import Limit, Performance
 from thermoctl.insight.wording import plain

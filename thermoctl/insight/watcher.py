@@ -10,16 +10,16 @@ import math
 from collections import deque
 
 from thermoctl.insight.assay import Assay
+from thermoctl.insight.assay_schedule import AssaySchedule
+from thermoctl.insight.change_words import change_of, change_of_gain, dilution, jump_at
 from thermoctl.insight.changes import ChangeWatch, Found
 from thermoctl.insight.faults import ELEMENT, TURN_LAGS, TURN_S, Faults
 from thermoctl.insight.gate import GateWatch
 from thermoctl.insight.performance import PerformanceWatch
-from thermoctl.insight.reckoning import Reckoning
 from thermoctl.insight.rest import Rest
 from thermoctl.insight.restless import Restless
 from thermoctl.insight.rows import rows
 from thermoctl.insight.samples import Samples
-from thermoctl.insight.told import change_of, change_of_gain, dilution, jump_at
 from thermoctl.insight.values import Change, Drift, Insight
 from thermoctl.insight.witness import Witness
 from thermoctl.quantities import Uncertain
@@ -148,7 +148,7 @@ class Insights:
             self._found(known, step.t_s, found)
         if plant.jumped:
             self._jumped(known, step.t_s)
-        assay = known.reckoning.after(step.t_s, self._rest)
+        assay = known.assays.after(step.t_s, self._rest)
         if assay is not None:
             self._assayed(known, step.t_s, assay)
         if good and self._rest.lasts_s(step.t_s) > 0.0 and not known.changes.busy:
@@ -197,7 +197,7 @@ class Insights:
 
     def _found(self, known: _WatchedPlant, t_s: float, found: Found) -> None:
         self._changes.appendleft(change_of(found, known.gain, self._given_w()))
-        known.reckoning.disturb(t_s)
+        known.assays.disturb(t_s)
         self._power = _Turn()
         if found.step_k is not None:
             self._faults.add_cold(dilution(found))
@@ -304,7 +304,7 @@ class _WatchedPlant:
         self.gain = Uncertain(plant.gain_k_per_s, plant.gain_sd_k_per_s)
         self.slope: Uncertain | None = None
         self._alike_s = math.nan
-        self.reckoning = Reckoning(self.lag_s, self.gain.mean, samples)
+        self.assays = AssaySchedule(self.lag_s, self.gain.mean, samples)
         self.changes = ChangeWatch(period_s, self.lag_s, self.gain.mean, power)
 
     def outlived(self, t_s: float, lag_s: float) -> bool:

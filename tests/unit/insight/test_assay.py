@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thermoctl.insight.assay import Stretch, assay, noise_of
-from thermoctl.insight.lagging import felt
+from thermoctl.insight.lagged_power import felt
 
 GAIN, LAG_S, NOISE_K = 0.045, 18.0, 0.02
 

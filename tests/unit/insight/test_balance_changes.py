@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thermoctl.insight.changes import ChangeWatch
-from thermoctl.insight.lagging import Lagging
+from thermoctl.insight.lagged_power import LaggedPower
 
 GAIN, LOSS, LAG_S, NOISE_K = 0.045, 0.009, 18.0, 0.02
 AT = 3000
@@ -19,10 +19,10 @@ def watched(samples, seed=1, befall=None, gain=GAIN, power=None):
     """
     rng = np.random.default_rng(seed)
     watch = ChangeWatch(1.0, LAG_S, GAIN, LOSS / GAIN)
-    lagging = Lagging(LAG_S, 1.0, LOSS / gain)
+    lagged = LaggedPower(LAG_S, 1.0, LOSS / gain)
     water, loss, u, found = 37.5, LOSS, LOSS / gain, []
     for k in range(samples):
-        water += gain * lagging.after(u) - loss
+        water += gain * lagged.after(u) - loss
         if befall is not None:
             water, loss = befall(k, water, loss)
         reading = water + NOISE_K * rng.normal()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from thermoctl.insight.lagging import Lagging, felt
+from thermoctl.insight.lagged_power import LaggedPower, felt
 
 
 def test_a_power_that_has_always_been_there_is_felt_as_it_is():
@@ -24,5 +24,5 @@ def test_a_pulse_is_felt_whole_and_one_lag_late(lag_s):
 
 def test_the_same_is_felt_sample_by_sample():
     power = np.random.default_rng(1).random(300)
-    lagging = Lagging(18.0, 2.0, float(power[0]))
-    assert [lagging.after(each) for each in power] == pytest.approx(felt(power, 18.0, 2.0))
+    lagged = LaggedPower(18.0, 2.0, float(power[0]))
+    assert [lagged.after(each) for each in power] == pytest.approx(felt(power, 18.0, 2.0))

@@ -25,7 +25,7 @@ SURE = 0.1
 """Relative standard deviation of a gain from which on it says nothing of a move."""
 
 
-class Reckoning:
+class AssaySchedule:
     """Assays the gain of one loop.
 
     Parameters

@@ -30,7 +30,7 @@ def _steps(lag_s: float, period_s: float) -> tuple[float, float]:
     )
 
 
-class Lagging:
+class LaggedPower:
     """The power of every sample, felt.
 
     Parameters
@@ -58,5 +58,5 @@ class Lagging:
 
 def felt(power: Array, lag_s: float, period_s: float) -> Array:
     """Return `power`, shape (N,), as felt; before the first it was the same."""
-    lagging = Lagging(lag_s, period_s, float(power[0]))
-    return np.array([lagging.after(each) for each in power.tolist()])
+    lagged = LaggedPower(lag_s, period_s, float(power[0]))
+    return np.array([lagged.after(each) for each in power.tolist()])
