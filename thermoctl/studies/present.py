@@ -13,6 +13,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from thermoctl.insight.wording import number
 from thermoctl.studies.experiment import Measures
 from thermoctl.studies.laws import parameter_names
 from thermoctl.studies.orders import Weighing
@@ -20,7 +21,7 @@ from thermoctl.studies.orders_words import orders_json, orders_lines, orders_row
 from thermoctl.studies.record import Record
 from thermoctl.studies.replay import Replay
 from thermoctl.studies.tables import print_whole, width_of
-from thermoctl.studies.words import ascii_only, counted, duration, is_utf8, number, probability
+from thermoctl.studies.words import ascii_only, counted, duration, is_utf8, probability
 
 Spelling = Callable[[str], str]
 """Turns words into those that the console can show; before they are laid out in columns."""

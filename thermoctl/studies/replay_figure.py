@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from thermoctl.insight.wording import number
 from thermoctl.quantities import Array
 from thermoctl.studies import figure as house
 from thermoctl.studies.laws import parameter_names
 from thermoctl.studies.orders_figure import draw_posterior
 from thermoctl.studies.record import GAP, Record
 from thermoctl.studies.replay import Replay, Trace
-from thermoctl.studies.words import number, probability
+from thermoctl.studies.words import probability
 
 _RECORD_IN, _ORDERS_IN, _PARAMETER_IN, _INNOVATION_IN = (1.25, 0.6), 0.95, 0.95, 0.8
 _TOP_IN, _BOTTOM_IN, _SPACE_IN = 0.45, 0.5, 0.33

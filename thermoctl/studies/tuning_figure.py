@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from thermoctl.insight.wording import number
 from thermoctl.quantities import Array
 from thermoctl.studies import figure as house
 from thermoctl.studies.excitation import Excitation
@@ -17,7 +18,6 @@ from thermoctl.studies.replay_figure import draw_record
 from thermoctl.studies.tuning import Tuning
 from thermoctl.studies.tuning_limits import Proposal
 from thermoctl.studies.tuning_words import limit_lines
-from thermoctl.studies.words import number
 
 _HEIGHTS_IN = (1.6, 0.7, 1.2, 1.7)
 _TOP_IN, _BOTTOM_IN = 0.45, 0.5

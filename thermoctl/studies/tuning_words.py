@@ -8,12 +8,13 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
+from thermoctl.insight.wording import number
 from thermoctl.studies.laws import parameter_names
 from thermoctl.studies.orders_words import order_text, orders_json, orders_lines, orders_rows
 from thermoctl.studies.plant_words import Bounded, PlantWords
 from thermoctl.studies.tuning import Tuning
 from thermoctl.studies.tuning_limits import Proposal
-from thermoctl.studies.words import duration, number
+from thermoctl.studies.words import duration
 
 _WIDTH = 18
 _REFERENCE_LAGS = 3.0

@@ -1,10 +1,8 @@
-"""Numbers as a reader wants them: digits deserved, true minus, no NaN."""
+"""Probabilities, counts and lengths of time in words; any text in ASCII."""
 
 from __future__ import annotations
 
 import math
-
-from thermoctl.insight.wording import number as number
 
 _ASCII = str.maketrans(
     {

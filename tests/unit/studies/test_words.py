@@ -2,7 +2,8 @@ import math
 
 import pytest
 
-from thermoctl.studies.words import counted, duration, number, probability
+from thermoctl.insight.wording import number
+from thermoctl.studies.words import counted, duration, probability
 
 
 @pytest.mark.parametrize(
