@@ -14,6 +14,13 @@ CODE = [TOP / "thermoctl", TOP / "drivers" / "thermoctl_drivers"]
 MODULES = sorted(path for root in CODE for path in root.rglob("*.py"))
 FUNCTION = ast.FunctionDef | ast.AsyncFunctionDef
 
+MAPPED = (
+    *("control", "control/adaptive", "control/gpc", "control/pid", "estimation", "insight"),
+    *("model", "plant", "regulator", "regulator/balance", "regulator/heater", "runtime"),
+    "services",
+)
+"""Rooms whose docstring says what each of their modules is for, by its name in backquotes."""
+
 MODULE_LINES, FUNCTION_LINES, SENTENCE = 400, 40, 80
 
 TEXT = {".c", ".h", ".md", ".py", ".rules", ".service", ".sh", ".toml", ""}
@@ -76,6 +83,16 @@ def test_every_public_docstring_begins_with_one_short_sentence():
         if not (first.endswith(".") and len(first) < SENTENCE)
     ]
     assert not wrong, "\n".join([f"{len(wrong)} first lines:", *wrong])
+
+
+@pytest.mark.parametrize("name", MAPPED)
+def test_the_docstring_of_a_room_is_a_map_of_all_its_modules(name):
+    room = TOP / "thermoctl" / name
+    text = ast.get_docstring(ast.parse((room / "__init__.py").read_text(encoding="utf-8")))
+    named_there = set(re.findall(r"`(\w+)[`.]", text or ""))
+    there = {path.stem for path in room.glob("[!_]*.py")}
+    there |= {path.parent.name for path in room.glob("*/__init__.py")}
+    assert there - named_there == set()
 
 
 def test_no_file_names_the_home_of_somebody():
