@@ -17,7 +17,7 @@ FUNCTION = ast.FunctionDef | ast.AsyncFunctionDef
 MAPPED = (
     *("control", "control/adaptive", "control/gpc", "control/pid", "estimation", "insight"),
     *("model", "plant", "regulator", "regulator/balance", "regulator/heater", "runtime"),
-    "services",
+    *("services", "studies", "studies/compare", "studies/papers"),
 )
 """Rooms whose docstring says what each of their modules is for, by its name in backquotes."""
 
