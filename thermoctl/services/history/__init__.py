@@ -1,8 +1,8 @@
 """Every finished cycle on disk, without ever making the loop wait.
 
-writer   a bounded feed, a thread and a commit a second
-reader   columns for a study, CSV for everybody else
-schema   the tables, and what a cycle looks like in them
+`writer` is a bounded feed, a thread and a commit a second, into a `file` that is opened or set
+aside. `reader` has columns for a study and CSV for everybody else. `schema` are the tables, and
+what a cycle looks like in them.
 """
 
 from thermoctl.services.history.reader import Recording, export, read_history
