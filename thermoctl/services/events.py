@@ -91,7 +91,6 @@ _BY_LEVEL: Final = {
         "controller.tuning",
         "heater.answered",
         "history.recovered",
-        "latch.cleared",
         "latch.saved",
         "load.changed",
         "loop.not_resumed",
@@ -123,6 +122,7 @@ EVENTS: Final[Mapping[str, str]] = MappingProxyType(
 REASONS: Final = frozenset(
     {
         "heater.check",
+        "latch.cleared",
         "limit.changeover",
         "limit.high",
         "limit.low",
@@ -132,6 +132,9 @@ REASONS: Final = frozenset(
     }
 )
 """Dotted names that only occur as the reason of a power or of a change of state."""
+
+RESERVED: Final = frozenset({"estimator.rejected", "sensor.stale"})
+"""Events that nothing reports at present; an old sample counts as a missing one."""
 
 
 def level_of(name: str) -> str:

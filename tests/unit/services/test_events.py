@@ -7,7 +7,7 @@ import re
 from itertools import pairwise
 from pathlib import Path
 
-from thermoctl.services.events import EVENTS, PRIORITIES, REASONS, level_of
+from thermoctl.services.events import EVENTS, PRIORITIES, REASONS, RESERVED, level_of
 
 ROOT = Path(__file__).parents[3]
 NAME = re.compile(r"[a-z]+\.[a-z_]+")
@@ -54,6 +54,16 @@ def test_every_event_in_the_source_is_registered():
     unknown = {str(path): names - set(EVENTS) - REASONS for path, names in found.items()}
     assert {path: names for path, names in unknown.items() if names} == {}
     assert any(found.values())
+
+
+def test_every_event_is_told_somewhere_unless_it_is_reserved():
+    """Names in the registry, in advice and in the live view's sentences tell nothing themselves."""
+    lists = {"events.py", "advice.py", "sentences.py"}
+    rooms = (ROOT / "thermoctl", ROOT / "drivers" / "thermoctl_drivers")
+    sources = [path for room in rooms for path in room.rglob("*.py") if path.name not in lists]
+    told = set().union(*(names_in(path.read_text(encoding="utf-8")) for path in sources))
+    put_together = {f"sensor.{which}_lost" for which in ("first", "second")}
+    assert set(EVENTS) - told - put_together == RESERVED
 
 
 def test_the_search_finds_an_event_however_it_is_told():
