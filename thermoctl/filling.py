@@ -16,13 +16,13 @@ T = TypeVar("T")
 def quickly_filled(cls: type[T]) -> type[T]:
     """Return the frozen dataclass `cls`, whose constructor now assigns its fields.
 
-    While it does, the instance belongs to an open twin of `cls`, of which nobody knows; what the
-    constructor returns is as frozen as before. It is worth it from some three fields on.
+    While it does, the instance is of a private subclass that is not frozen; what the constructor
+    returns is of `cls`, and as frozen as before. It pays from some three fields on.
 
     Raises
     ------
     TypeError
-        `cls` has something else to do at its start than to take its fields as they come.
+        `cls` has a ``__post_init__``, a default factory or a field that is no argument.
     """
     told: tuple[Any, ...] = fields(cls)  # type: ignore[arg-type]
     plain = all(each.init and each.default_factory is MISSING for each in told)

@@ -278,11 +278,11 @@ class Event:
 
 
 def _nothing() -> None:
-    """Return what is known of a plant of which nothing is."""
+    """Return None: nothing is known of the plant."""
 
 
 def _no_models() -> Mapping[str, Mapping[str, Any]]:
-    """Return what is worth keeping of laws that remember nothing."""
+    """Return no models: these laws remember nothing."""
     return {}
 
 
@@ -297,8 +297,8 @@ class Step:
     would have given, within the limit of power; None where there is none, or no answer. `origin`
     says what the model of the one in charge began with: ``new`` with nothing, ``trial`` or
     ``stored`` with what an earlier run had learnt, ``dropped`` with that in vain. `remember`
-    returns what each of the two would like to be kept, by the name of its law; like `plant`, it is
-    reckoned when asked for.
+    returns what each of the two would like to be kept, by the name of its law. Like `tell`, which
+    returns `plant`, it is a function, so that only who asks pays for the answer.
     """
 
     t_s: float

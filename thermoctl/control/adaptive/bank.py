@@ -147,7 +147,7 @@ class Bank:
         return self.met(belief, self.ahead(belief, applied), y_c)
 
     def ahead(self, belief: BankBelief, applied: float) -> Ahead:
-        """Return what a period of `applied` makes of `belief`, whatever will be read."""
+        """Return the time update: what a period of `applied` makes of `belief`."""
         power = clamp(applied, self.u_min, self.u_max)
         way = path.pushed(belief.path, self.hypotheses, power)
         outlook, full, x = belief.outlook, belief.full, belief.x
@@ -183,7 +183,7 @@ class Bank:
         return share == 0.0 and unrest < self.hearing.quiet_power
 
     def met(self, belief: BankBelief, ahead: Ahead, y_c: float) -> BankBelief:
-        """Return the belief after the reading `y_c` at the end of the period `ahead`.
+        """Return the measurement update, by the reading `y_c` at the end of `ahead`.
 
         Raises
         ------

@@ -75,7 +75,7 @@ class BankBelief(NamedTuple):
 
 
 class Twin(NamedTuple):
-    """The same plant, had it been met otherwise: at rest, or under full power.
+    """The same plant from another initial condition: at rest, or under full power.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Twin(NamedTuple):
 
 
 class Ahead(NamedTuple):
-    """What a period makes of a belief before the reading at its end is seen.
+    """The time update: what a period makes of a belief before its reading is seen.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ class Ahead(NamedTuple):
 
 
 class Met(NamedTuple):
-    """The part of a belief that readings change."""
+    """The measurement update: the part of a belief that readings change."""
 
     noise: Noise
     gate: Gate
