@@ -6,7 +6,9 @@ import pytest
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
 from thermoctl.regulator.alarms import AlarmRegister
-from thermoctl.regulator.balance.feasible import DRIVEN, Feasibility, Wanted
+from thermoctl.regulator.balance.feasible import Feasibility
+from thermoctl.regulator.balance.reach_alarms import DRIVEN
+from thermoctl.regulator.balance.wanted import Wanted
 from thermoctl.signals import Measurement, Mode
 
 

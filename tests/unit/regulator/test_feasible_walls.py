@@ -9,8 +9,9 @@ from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
 from thermoctl.quantities import Uncertain
 from thermoctl.regulator.alarms import AlarmRegister
-from thermoctl.regulator.balance.feasible import Feasibility, Wanted
+from thermoctl.regulator.balance.feasible import Feasibility
 from thermoctl.regulator.balance.foretold import Settling, Slip
+from thermoctl.regulator.balance.wanted import Wanted
 from thermoctl.regulator.guard import Failure
 from thermoctl.signals import Feasible, Measurement, Mode
 

@@ -8,7 +8,7 @@ import pytest
 
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
-from thermoctl.regulator.balance.feasible import Wanted
+from thermoctl.regulator.balance.wanted import Wanted
 from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.ceiling import FELL_K, FOLLOWED_S, Ceiling
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen

@@ -8,28 +8,25 @@ seconds, so that a sample costs next to nothing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from thermoctl.quantities import Uncertain, clamp
 from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.regulator.balance import heat_loss
 from thermoctl.regulator.balance.foretold import Nearing, Settling, Slip
-from thermoctl.regulator.balance.heat_belief import HeatBelief, T
+from thermoctl.regulator.balance.heat_belief import HeatBelief
 from thermoctl.regulator.balance.heat_loss import Stretch
-from thermoctl.regulator.balance.left_alone import PATIENCE_S, Beyond, LeftAlone
+from thermoctl.regulator.balance.reach_alarms import Given, ReachAlarms
+from thermoctl.regulator.balance.wanted import Wanted as Wanted
 from thermoctl.regulator.guard import Failure
 from thermoctl.regulator.supervisor import Emit
-from thermoctl.signals import Alarm, Feasible, Mode
+from thermoctl.signals import Feasible
 
 STRETCH_S = 10.0
 LAG_GUESS_S = 30.0
 """Lag in s that is assumed while the controller knows none."""
 ARRIVED_K = 0.1
 """Distance in K from the set point within which it counts as reached."""
-SURE_SDS, OVER_SDS = 3.0, 1.0
-"""An alarm comes when its condition holds by more than SURE_SDS standard deviations, and goes when
-it holds by less than OVER_SDS."""
 SD_MOST_K = 50.0
 POWER_SD_MOST = 0.3
 """A limit known to no better than SD_MOST_K, and a holding power known to no better than
@@ -40,21 +37,7 @@ LAG_DOUBT = 0.4
 """Standard deviation of the time that the last heat takes, as a share of it and of the lag."""
 UNSEEN_S = 60.0
 """Time in s without a reading after which no forecast is reported, and no alarm comes or goes."""
-FULL = 0.95
-"""Share of the most power from which on it counts as full."""
-STEADY = 12
-"""Number of stretches in a row that must agree before an alarm comes or goes."""
-
-UNREACHABLE = "setpoint.unreachable"
-DRIVEN = "plant.driven"
 FAILED = "balance.failed"
-_PRIORITY = 2
-NONE = 0.02
-"""Commanded power up to which the plant counts as unpowered. Heat that an output gives beyond its
-command, because it cannot keep it back, drives the plant all the same."""
-BEYOND_K = 0.5
-"""Distance in K beyond the set point from which on a plant is driven, and distance of a set point
-beyond the ceiling from which on it is out of reach. Less is regulation."""
 
 
 class Gathered(NamedTuple):
@@ -72,51 +55,6 @@ class Gathered(NamedTuple):
         return self.total_c / self.readings if self.readings else math.nan
 
 
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """What is to be held, in `mode`: a set point in degC, with at most `power_max`.
-
-    `ramp_s` is how long the reference is still on its way there; `power_cools` says what power does
-    where it is wired as it should be. `led`: it is another loop that wants it, and never all of it
-    at once: nothing is told of such a set point. `ceiling_c` is what the plant was seen to come to,
-    and not to pass for all its power.
-    """
-
-    setpoint_c: float
-    power_max: float
-    mode: Mode
-    ramp_s: float = 0.0
-    power_cools: bool = False
-    led: bool = False
-    ceiling_c: float = math.nan
-
-    @property
-    def counts(self) -> bool:
-        """Whether anybody is told that it cannot be held."""
-        return self.mode is Mode.AUTO and not self.led
-
-    @property
-    def beyond_ceiling(self) -> bool:
-        """Whether the plant has been seen not to come near the set point."""
-        beyond_k = self.setpoint_c - self.ceiling_c
-        return (-beyond_k if self.power_cools else beyond_k) > BEYOND_K
-
-
-class Standing:
-    """Whether a condition has held for long enough; it ends more slowly."""
-
-    def __init__(self) -> None:
-        self.stands, self._contrary = False, 0
-
-    def weigh(self, sds: float, *, counts: bool) -> bool:
-        """Take in its standard deviations in a stretch; return whether it changed."""
-        stood, far = self.stands, sds > (OVER_SDS if self.stands else SURE_SDS)
-        self._contrary = 0 if far is stood else self._contrary + 1
-        if self._contrary >= STEADY or not counts:
-            self.stands, self._contrary = far and counts, 0
-        return self.stands is not stood
-
-
 class Feasibility:
     """Keeps the balance of heat of a loop; says when a set point is out of reach.
 
@@ -132,7 +70,6 @@ class Feasibility:
 
     def __init__(self, period_s: float, alarms: AlarmRegister, emit: Emit) -> None:
         self._unknown_s = max(60.0, 10.0 * period_s)
-        self._alarms = alarms
         self._emit = emit
         self._belief: HeatBelief | None = None
         self._gathered = Gathered()
@@ -143,9 +80,8 @@ class Feasibility:
         self._reading_c = math.nan
         self._unseen_s = 0.0
         self._slip, self._settling, self._nearing = Slip(), Settling(), Nearing()
-        self._alone = LeftAlone()
+        self._reach = ReachAlarms(alarms, emit)
         self._failed = False
-        self._standings = {UNREACHABLE: Standing(), DRIVEN: Standing()}
         self.known = Feasible()
 
     @property
@@ -209,7 +145,7 @@ class Feasibility:
         """Begin anew, with nothing known."""
         self._belief, self._gathered, self._before = None, Gathered(), Gathered()
         self._heat, self._asked, self.known = 0.0, 0.0, Feasible()
-        self._alone.clear()
+        self._reach.forget()
         self._nearing.clear()
 
     def fail(self, failure: Failure) -> None:
@@ -250,7 +186,9 @@ class Feasibility:
             return
         # A set point that never rests says nothing of what can be held, nor of an arrival.
         self.known = Feasible() if wanted.led else self._feasible(belief, wanted, t_s)
-        self._tell(belief, wanted, t_s)
+        given = Given(now.span_s, self._heat, self._asked)
+        nears = self._nearing.arrives(wanted.setpoint_c)
+        self._reach.tell(self.known, belief, wanted, given, t_s, nears=nears)
 
     # -- what follows ----------------------------------------------------------------------------
 
@@ -289,99 +227,7 @@ class Feasibility:
         slower = wanted.ramp_s > arrival.mean
         return Uncertain(wanted.ramp_s, LAG_DOUBT * lag_s) if slower else arrival
 
-    def _driven_sds(self, belief: HeatBelief, wanted: Wanted, none: bool) -> float:
-        """Return by how many standard deviations a plant without power is driven.
-
-        It leaves the set point behind, or does not come back to it: something else heats what
-        should be heated, the air or an output that is stuck at too little for `heater.stuck_on`.
-        The first needs no gain: what has been stuck on since before a start is all that this run
-        has seen of its heater. Nor does it need one that a plant stands still where it is, or goes
-        on: a controller that takes its power back in vain teaches that power does the opposite.
-        """
-        sign = -1.0 if wanted.power_cools else 1.0
-        here_c, gain = sign * belief.x[T], sign * belief.gain
-        self._alone.seen(here_c)
-        way_k = here_c - sign * wanted.setpoint_c
-        known = belief.gain_known
-        reversed_ = known and gain < 0.0 and not self._alone.knows
-        if not (none and way_k >= BEYOND_K):
-            self._alone.clear()
-            return 0.0
-        away = heat_loss.spare(belief, sign * here_c, 0.0, belief.ahead_k)
-        plant = Beyond(here_c, gain, -sign * away.mean) if known else Beyond(here_c, 0.0, 0.0)
-        missing = self._alone.missing(plant, self._before.span_s, math.sqrt(belief.R))
-        stays = self._alone.stays(here_c, way_k, self._before.span_s)
-        if reversed_:
-            return SURE_SDS * stays
-        leaves = known or self._alone.waited
-        leaves_sds = sign * away.mean / away.sd if leaves else 0.0
-        return max(leaves_sds, SURE_SDS * missing, SURE_SDS * stays)
-
-    def _tell(self, belief: HeatBelief, wanted: Wanted, t_s: float) -> None:
-        """Raise the alarms, or clear them."""
-        full, none = self._heat >= FULL * wanted.power_max, abs(self._asked) <= NONE
-        missing_sds = _missing_sds(belief, wanted, full)
-        if self._nearing.arrives(wanted.setpoint_c) and not wanted.beyond_ceiling:
-            missing_sds = 0.0  # the limit moves on to the set point
-        driven_sds = self._driven_sds(belief, wanted, none)
-        for code, sds, words in (
-            (UNREACHABLE, missing_sds, _missing_words),
-            (DRIVEN, driven_sds, _driven_words),
-        ):
-            standing = self._standings[code]
-            news = standing.weigh(sds, counts=wanted.counts)
-            if standing.stands:
-                text = words(self.known, belief, wanted)
-                if self._alarms.set(Alarm(code, None, _PRIORITY, t_s, text)) and news:
-                    self._emit(code, text=text)
-            elif news:
-                self._alarms.clear(code)
-
 
 def _within(known: Uncertain, sd_most: float) -> Uncertain:
     """Return what is known, or nothing where it is too vague to be told."""
     return known if known.sd <= sd_most else Uncertain()
-
-
-def _missing_sds(belief: HeatBelief, wanted: Wanted, full: bool) -> float:
-    """Return by how many standard deviations the most power does not reach the set point.
-
-    That is the better of two ways to be sure: by the slope that was learnt, and by how slowly the
-    plant still moves, which also tells of one that stands at its limit from the start.
-    """
-    if wanted.beyond_ceiling:
-        return math.inf
-    here_c = belief.x[T]
-    way_k = wanted.setpoint_c - here_c
-    towards = math.copysign(1.0, way_k)
-    if belief.gain_known and towards * belief.gain < 0.0:
-        return 0.0  # a heater is not asked to cool
-    here = heat_loss.spare(belief, here_c, wanted.power_max)
-    slow = (abs(way_k) / PATIENCE_S - towards * here.mean) / here.sd
-    if not belief.gain_known:
-        return slow if full else 0.0
-    there = heat_loss.spare(belief, wanted.setpoint_c, wanted.power_max, straight=True)
-    return max(slow, -towards * there.mean / there.sd)
-
-
-def _driven_words(_: Feasible, belief: HeatBelief, wanted: Wanted) -> str:
-    """Return what was expected of a plant without power, and what came."""
-    minute_k = 60.0 * heat_loss.spare(belief, belief.x[T], 0.0).mean
-    return (
-        f"expected the plant to come to {wanted.setpoint_c:g} degC without power, it moves by "
-        f"{minute_k:+.2f} K a minute at {belief.x[T]:.1f} degC"
-    )
-
-
-def _missing_words(known: Feasible, belief: HeatBelief, wanted: Wanted) -> str:
-    """Return what was expected of the set point, and what came."""
-    here_c = belief.x[T]
-    side = "most" if wanted.setpoint_c > here_c else "least"
-    which = "full power" if wanted.power_max == 1.0 else f"a power of {wanted.power_max:g}"
-    limit = f"{known.highest_c:.1f} +-{known.highest_sd_k:.1f} degC"
-    if not math.isfinite(known.highest_c):
-        limit = f"about {here_c:.1f} degC"
-    return (
-        f"expected at {side} {limit}, which {which} can hold, "
-        f"got a set point of {wanted.setpoint_c:g} degC"
-    )

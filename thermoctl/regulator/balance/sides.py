@@ -16,7 +16,9 @@ import math
 from dataclasses import replace
 
 from thermoctl.regulator.alarms import AlarmRegister
-from thermoctl.regulator.balance.feasible import NONE, Feasibility, Wanted
+from thermoctl.regulator.balance.feasible import Feasibility
+from thermoctl.regulator.balance.reach_alarms import NONE
+from thermoctl.regulator.balance.wanted import Wanted
 from thermoctl.regulator.guard import Failure
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Emit
