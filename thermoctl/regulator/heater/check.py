@@ -1,4 +1,4 @@
-"""How a heater is checked."""
+"""Settings of the heater check, and the least gain that is taken for healthy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ and for losses meanwhile."""
 
 @dataclass(frozen=True, slots=True)
 class HeaterCheck:
-    """How a heater is checked.
+    """Settings of the heater check.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is made of an answer, and from when on it is believed.
+"""Which answers of a heater count, and how soon they are believed.
 
 `question` reads it off the readings around the cut alone. Where a load may have given it,
 `evidence` weighs in all that was seen since the doubt began.

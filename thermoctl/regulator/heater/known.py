@@ -69,14 +69,14 @@ class KnownHeater:
         self.recalled = self._obeys = False
         self._most = self._outdone_k = 0.0
         self._eased: Seen | None = None  # when less power began
-        self._once: int | None = None  # place of the lag of a memory that is disowned
-        self._as_once = False  # whether this run finds the same
+        self._disowned: int | None = None  # place of the lag of a memory that is disowned
+        self._lag_as_disowned = False  # whether this run finds the same
 
     def disown(self) -> None:
         """Forget a memory of another plant, but for its lag."""
         once = None if self.gain is None else self.gain.place
         self.forget()
-        self._once = once
+        self._disowned = once
 
     def recall(self, gain: Gain) -> None:
         """Begin with what an earlier run knew, by powers that moved."""
@@ -153,7 +153,7 @@ class KnownHeater:
         self._most = max(self._most, power)
         gain, start = self.gain, self._eased
         if gain is not None and power >= EASED * self._most:  # one stuck on teaches any lag later
-            self._as_once = gain.place == self._once
+            self._lag_as_disowned = gain.place == self._disowned
         if gain is None or self._obeys or power >= EASED * self._most:
             self._eased = None
         elif start is None:
@@ -180,18 +180,20 @@ class KnownHeater:
     @property
     def under_way_s(self) -> float:
         """How long after the power heat of before may still arrive."""
-        return OFF_LAGS * (self._next_s if self._obeys or self._as_once else LAGS_S[-1])
+        return OFF_LAGS * (
+            self._lag_or_next_s if self._obeys or self._lag_as_disowned else LAGS_S[-1]
+        )
 
     @property
     def over_s(self) -> float:
         """How long after the power a rise is none of its heat."""
-        return self.under_way_s + self._next_s
+        return self.under_way_s + self._lag_or_next_s
 
     @property
-    def _next_s(self) -> float:
+    def _lag_or_next_s(self) -> float:
         """The lag; the next longer one where it is an earlier run that has seen it."""
-        if self._as_once and not self._obeys and self._once is not None:
-            return LAGS_S[min(self._once + 1, len(LAGS_S) - 1)]
+        if self._lag_as_disowned and not self._obeys and self._disowned is not None:
+            return LAGS_S[min(self._disowned + 1, len(LAGS_S) - 1)]
         return self.longer_s
 
 

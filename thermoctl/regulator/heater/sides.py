@@ -39,8 +39,8 @@ class Sides:
     def __init__(self, check: HeaterCheck, period_s: float, supervisor: Reacts, emit: Emit) -> None:
         self._emit = emit
         self.heater = HeaterWatch(check.of_heater, period_s, supervisor, emit)
-        named = _Named(supervisor)
-        self.cooler = HeaterWatch(check.of_cooler, period_s, named, self._of_cooler)
+        reacts = _OfCooler(supervisor)
+        self.cooler = HeaterWatch(check.of_cooler, period_s, reacts, self._emit_of_cooler)
         self._acts = 0  # 1 the heater, -1 the cooler, 0 neither
 
     @property
@@ -66,12 +66,12 @@ class Sides:
         if acts <= 0:
             self.cooler.observe(t_s, interval_s, reading_c, max(-applied, 0.0))
 
-    def _of_cooler(self, name: str, *, text: str) -> None:
+    def _emit_of_cooler(self, name: str, *, text: str) -> None:
         self._emit(name, text=_COOLER + text)
 
 
-class _Named:
-    """A supervisor that is told which of the two is meant."""
+class _OfCooler:
+    """A supervisor that is told that the cooler is meant."""
 
     def __init__(self, supervisor: Reacts) -> None:
         self._supervisor = supervisor

@@ -110,7 +110,7 @@ class HeaterWatch:
             self._supervisor.fail("sensor.stuck", 4, text, t_s)
         block = self._blocks.add(interval_s, reading_c, applied)
         if block is not None:
-            self._meet(block, t_s)
+            self._evaluate(block, t_s)
 
     @property
     def under_way_s(self) -> float:
@@ -135,7 +135,7 @@ class HeaterWatch:
 
     # -- a block ---------------------------------------------------------------------------------
 
-    def _meet(self, block: Block, t_s: float) -> None:
+    def _evaluate(self, block: Block, t_s: float) -> None:
         """Evaluate a complete block."""
         known, sd_k = self._heater.gain, block.sd_k
         self._t_s += block.span_s
@@ -146,7 +146,7 @@ class HeaterWatch:
         self._response.observe(block, learn=learns)
         if self._response.retracted and self._heater.retract():
             self._trial.begin(self._t_s)
-            self._go_on()
+            self._resume()
         if math.isnan(block.reading_c):
             return
         before = self._rows[-1] if self._rows else None
@@ -155,7 +155,7 @@ class HeaterWatch:
         if known is not None and self._ceiling.found(self._rows, known, now, sd_k):
             self._withdraw()
         if self._cut is not None:
-            self._hear(self._cut, block, now, t_s)
+            self._look_for_answer(self._cut, block, now, t_s)
             return
         if there:
             self._climb.pause()
@@ -166,12 +166,12 @@ class HeaterWatch:
                 self._heater.learn(self._response.gain, now, self._response.moved_k, sd_k)
             self._heater.follow(block.power, now)
         if before is not None:
-            self._follow(block, before, now)
+            self._follow_climb(block, before, now)
             outdone = self._heater.outdone(block.power, before, now, sd_k)
             if outdone and not self._response.jumped:
                 self._disown(now)
         if self._cut is None and not self._heater.seen:
-            self._try(block, now)
+            self._try_out(block, now)
         known, settled = self._heater.gain, self._t_s >= self._settled_s
         if known is not None and settled and self._cut is None and before is not None:
             self._compare(known, block, before, now, t_s)
@@ -191,7 +191,7 @@ class HeaterWatch:
         self._doubt, self._distrusted_k = HeatDoubt(), 0.0
         self._trial.begin(now.t_s)
 
-    def _follow(self, block: Block, before: Seen, now: Seen) -> None:
+    def _follow_climb(self, block: Block, before: Seen, now: Seen) -> None:
         """Follow a climb, of a heater that is known or not; ask it when it has stalled."""
         known, rising, jumped = self._heater.gain, self._climb, self._response.jumped
         rising.observe(known, block, before, now, jumped=jumped)
@@ -202,7 +202,7 @@ class HeaterWatch:
             from_s = now.t_s - max(BEFORE_LAGS * lag_s, climb.STALLED_S)
             self._ask(Cut(now.t_s, from_s, rising.told(now)))
 
-    def _try(self, block: Block, now: Seen) -> None:
+    def _try_out(self, block: Block, now: Seen) -> None:
         """Let an unknown heater show a rise; ask it when it has had its heat."""
         why = self._trial.fails(self._heater.counts(block.power), block, now)
         if why:
@@ -210,7 +210,7 @@ class HeaterWatch:
 
     def _compare(self, known: Gain, block: Block, before: Seen, now: Seen, t_s: float) -> None:
         """Compare what a known heater should have done with what came."""
-        if not self._heater.proven and self._heated(known, now, block.sd_k, t_s):
+        if not self._heater.proven and self._latch_if_heated(known, now, block.sd_k, t_s):
             return  # one that is proven is judged by what may come late, below
         doubt, sd_k, jumped = self._doubt, block.sd_k, self._response.jumped
         again = self._distrusted_k > 0.0
@@ -261,10 +261,10 @@ class HeaterWatch:
             self._ceiling.follow(self._rows, self._heater.gain, cut.at_s)
         self._emit("heater.questioned", text=f"{cut.why}; power is cut to see what it does")
 
-    def _hear(self, cut: Cut, block: Block, now: Seen, t_s: float) -> None:
+    def _look_for_answer(self, cut: Cut, block: Block, now: Seen, t_s: float) -> None:
         """Look for an answer; go on when it is a good one, fail when it is none."""
         known, lag_s, asked_s = self._heater.gain, self._heater.longer_s, now.t_s - cut.at_s
-        if known is not None and self._heated(known, now, block.sd_k, t_s):
+        if known is not None and self._latch_if_heated(known, now, block.sd_k, t_s):
             return
         answer, shown = self._answer(cut, block.sd_k)
         if known is None and answer is Answer.HEATS and not arrived(shown, now):
@@ -299,12 +299,12 @@ class HeaterWatch:
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
                 return
             self._trial.enlarge(block.sd_k)
-            self._go_on()
+            self._resume()
 
     def _leave_open(self, asked_s: float) -> None:
         """Go on: what is in doubt is the moment of the cut, and another one tells."""
         self._emit("heater.answered", text=hearing.HIDDEN.format(asked_s))
-        self._go_on()
+        self._resume()
 
     def _answer(self, cut: Cut, sd_k: float, sure: float = question.SURE) -> tuple[Answer, Gain]:
         """Return what the reading says so far, and the gain it shows."""
@@ -316,7 +316,7 @@ class HeaterWatch:
             froms_s += [self._trial.since_s, -math.inf]
         return question.of_unknown_rows(self._rows, froms_s, cut.at_s, weakest, sd_k)
 
-    def _heated(self, known: Gain, now: Seen, sd_k: float, t_s: float) -> bool:
+    def _latch_if_heated(self, known: Gain, now: Seen, sd_k: float, t_s: float) -> bool:
         """Return whether the reading has risen long after the power went, and latch that."""
         if self._off_s <= self._heater.over_s:
             return False
@@ -346,7 +346,7 @@ class HeaterWatch:
         """Go on with a heater that heats; what made it doubtful is how the plant is now."""
         self._doubt.trust()
         self._climb.clear()
-        self._go_on()
+        self._resume()
 
     def _refuse(self, answer: Answer, cut: Cut, shown: Gain, asked_s: float, t_s: float) -> None:
         """Fail a heater that answered with nothing, or the wrong way.
@@ -363,7 +363,7 @@ class HeaterWatch:
             asked_c = [row.reading_c for row in self._rows if row.t_s >= cut.from_s]
             self._refused_c = max(asked_c) + trial.RISE_K  # one that falls bends like a lag
             self._trial.insist(self._t_s)
-            self._go_on()
+            self._resume()
             return
         code = "heater.reversed" if answer is Answer.COOLS else "heater.no_response"
         known = "" if self.known is None else f" instead of {self.known.mean:.3g}"
@@ -388,9 +388,9 @@ class HeaterWatch:
             self._distrusted_k = 2.0 * known.stored_k
             from_s = self._t_s - max(known.lag_s, BEFORE_S)
             self._doubt.distrust(known, -question.slope(self._rows, from_s))
-        self._go_on()
+        self._resume()
 
-    def _go_on(self) -> None:
+    def _resume(self) -> None:
         self._cut = None
         self._climb.pause()
         self._doubt.clear()
