@@ -1,4 +1,4 @@
-"""Fills frozen dataclasses as fast as open ones.
+"""Constructors of frozen dataclasses, as fast as those of open ones.
 
 The constructor that `dataclass` writes for a frozen class hands every field to
 ``object.__setattr__``, because the class itself refuses it: ten times the price of an assignment.

@@ -1,4 +1,4 @@
-"""Where rooms meet without knowing each other: protocols only.
+"""Protocols by which rooms meet without importing each other.
 
 Runtime and drivers know these, not each other; `thermoctl.app.compose` puts them together.
 """

@@ -1,4 +1,4 @@
-"""A condition that flickers, as one that lasts."""
+"""A condition that flickers, debounced."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-r"""What a model says of the samples that a power can no longer change.
+r"""Prediction over the delay: the samples that a power can no longer change.
 
 With a delay of d samples the power of now meets the temperature d samples on. What lies between is
 already decided, by powers that were applied, and is predicted by iterating the model:

@@ -1,4 +1,4 @@
-r"""Which order and which delay: filters that weigh themselves against each other.
+r"""The Lainiotis bank: order and delay, by filters weighed against each other.
 
 Every candidate runs a Kalman filter of its own on the same samples. How well it predicted each of
 them multiplies up to the probability that it is the true one, and what the bank as a whole

@@ -1,4 +1,4 @@
-r"""The gain of a plant, assayed on a stretch of samples whose noise is known.
+r"""The gain of a plant, estimated on a stretch of samples whose noise is known.
 
 .. math:: \Delta y_k = \beta h\, q_k - d - c\,(y_{k-1} - \bar y) + \nu_k
 

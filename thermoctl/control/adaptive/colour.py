@@ -1,4 +1,4 @@
-"""Noise that is like itself a sample later: a hum, a reading that is rounded.
+"""Coloured noise: what is alike from one sample to the next, as a hum is.
 
 Filters take the noise of a reading for white. A hum of a tenth of a kelvin is then found again at
 every sample, as if it were news, and some lag explains it better than the true one. What white

@@ -1,4 +1,4 @@
-"""How likely a reading was, before it was seen.
+"""The likelihood of a reading, by the belief before it was seen.
 
 Implements section 9 of ``docs/theory.md``.
 """

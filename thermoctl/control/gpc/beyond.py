@@ -1,4 +1,4 @@
-r"""What the powers cost beyond the horizon, where the model is a straight line.
+r"""The terminal cost: what powers cost beyond the horizon, on a straight line.
 
 Once the lag is over, nothing is left of the model but heat put in less heat lost. The reading that
 all heat under way leads to is
