@@ -104,7 +104,7 @@ class ClientLine:
         finished = self._last or (self._ended and b"\n" not in self._inbox)
         return finished or now_s - self.heard_s > SILENT_S
 
-    def rudeness(self, now_s: float, *, busy: bool) -> tuple[bool, bool, int, float]:
+    def eviction_rank(self, now_s: float, *, busy: bool) -> tuple[bool, bool, int, float]:
         """Return how readily it makes room for others; the greatest goes first.
 
         Who has closed its side, then who is silent while not `busy`, then who has sent the most

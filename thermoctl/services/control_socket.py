@@ -167,15 +167,15 @@ class ControlSocket:
     def _admit(self, client: ClientLine) -> None:
         """Take a newcomer in and hear it; where all places are taken, somebody makes room."""
         if len(self._clients) >= CLIENTS:
-            self._drop(self._rudest())
+            self._drop(self._first_to_evict())
         self._clients.append(client)
         self._attend(client, [])
 
-    def _rudest(self) -> ClientLine:
+    def _first_to_evict(self) -> ClientLine:
         """Return who makes room for others; there is one, for fewer watch than there are places."""
         now_s = self._clock_s()
         talking = [each for each in self._clients if each not in self._watching]
-        return max(talking, key=lambda each: each.rudeness(now_s, busy=each in self._pending))
+        return max(talking, key=lambda each: each.eviction_rank(now_s, busy=each in self._pending))
 
     def _told_of(self, cycle: Cycle) -> _Told:
         """Return what watching clients are told, made once for all of them."""
