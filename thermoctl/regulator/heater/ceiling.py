@@ -20,7 +20,7 @@ from collections.abc import Iterable, Sequence
 from thermoctl.regulator.heater import evidence
 from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.climb import KEEPS, STALLED_S
-from thermoctl.regulator.heater.doubt import SDS, STANDS_K
+from thermoctl.regulator.heater.doubt import DOUBT_SDS, STANDS_K
 from thermoctl.regulator.heater.response import Gain, Seen
 
 FELL_K, FELL_SDS = 0.2, 8.0
@@ -87,7 +87,7 @@ class Ceiling:
         self._most = max(self._most, block.power)
         if not self.known:
             return False
-        near_k = max(STANDS_K, SDS * block.sd_k)
+        near_k = max(STANDS_K, DOUBT_SDS * block.sd_k)
         above_k = block.reading_c - self.level_c
         if above_k > near_k:
             self.clear()

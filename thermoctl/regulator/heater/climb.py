@@ -30,9 +30,9 @@ from thermoctl.regulator.heater.doubt import (
     CALM,
     CALM_SDS,
     COOLS_WITHIN_S,
+    DOUBT_K,
+    DOUBT_SDS,
     HALF,
-    LEAST_K,
-    SDS,
     SURE_SHARE,
 )
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
@@ -127,13 +127,13 @@ class Climb:
 
     def calm(self, sd_k: float) -> bool:
         """Return whether nothing is missing, so that gain and loss may be learnt."""
-        if self._missing_k <= CALM * LEAST_K:  # nearly always
+        if self._missing_k <= CALM * DOUBT_K:  # nearly always
             return True
         return self._missing_k <= max(CALM * self._limit_k(sd_k), CALM_SDS * sd_k)
 
     def stalled(self, sd_k: float) -> bool:
         """Return whether the reading does not rise as it did under the same power."""
-        return self._missing_k > LEAST_K and self._missing_k > self._limit_k(sd_k)
+        return self._missing_k > DOUBT_K and self._missing_k > self._limit_k(sd_k)
 
     def told(self, now: Seen) -> str:
         """Return what was expected since the climb began to be missing, and what came."""
@@ -148,7 +148,7 @@ class Climb:
 
     def _limit_k(self, sd_k: float) -> float:
         """Return the sum in K from which on it is a doubt."""
-        return max(LEAST_K, SDS * sd_k, STALLS_S * self._rate)
+        return max(DOUBT_K, DOUBT_SDS * sd_k, STALLS_S * self._rate)
 
     def _expected(self, known: Gain | None, reading_c: float, power: float) -> float:
         """Return how fast the reading should rise under `power`, in K/s."""

@@ -19,12 +19,12 @@ from thermoctl.quantities import clamp
 from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Heat, Seen
 
-LEAST_K, SDS, LAGS = 0.3, 5.0, 1.0
-"""A sum is a doubt when it exceeds all three: LEAST_K in K, SDS standard deviations of a reading,
-and LAGS times the rise of one lag at full power."""
-LAGS_AGAIN = 0.4
-"""LAGS after a bad answer. The second question comes sooner: it does no harm to a mended heater,
-and another one goes on heating unseen."""
+DOUBT_K, DOUBT_SDS, DOUBT_LAGS = 0.3, 5.0, 1.0
+"""A sum is a doubt when it exceeds all three: DOUBT_K in K, DOUBT_SDS standard deviations of a
+reading, and DOUBT_LAGS times the rise of one lag at full power."""
+DOUBT_LAGS_AGAIN = 0.4
+"""DOUBT_LAGS after a bad answer. The second question comes sooner: it does no harm to a mended
+heater, and another one goes on heating unseen."""
 EXTRA_LAGS = 0.6
 CALM, CALM_SDS = 0.1, 2.0
 """A sum counts as nothing below CALM of its limit or CALM_SDS standard deviations of a reading, and
@@ -146,9 +146,9 @@ class HeatDoubt:
     def calm(self, gain: Gain, sd_k: float) -> bool:
         """Return whether nothing is in doubt, so that gain and loss may be learnt."""
         worst_k = max(self._missing_k, self._extra_k)
-        if worst_k < CALM * LEAST_K:  # nearly always
+        if worst_k < CALM * DOUBT_K:  # nearly always
             return True
-        return worst_k < max(CALM * _limit_k(gain, sd_k, LAGS), CALM_SDS * sd_k)
+        return worst_k < max(CALM * _limit_k(gain, sd_k, DOUBT_LAGS), CALM_SDS * sd_k)
 
     def cold(self, gain: Gain, sd_k: float, *, again: bool = False) -> bool:
         """Return whether the reading fails to answer; sooner `again`, after a bad answer."""
@@ -156,9 +156,9 @@ class HeatDoubt:
 
     def short(self, gain: Gain, sd_k: float, *, again: bool) -> bool:
         """Return whether the reading has not risen as the heat should have made it."""
-        if self._missing_k <= LEAST_K:  # nearly always
+        if self._missing_k <= DOUBT_K:  # nearly always
             return False
-        return self._missing_k > _limit_k(gain, sd_k, LAGS_AGAIN if again else LAGS)
+        return self._missing_k > _limit_k(gain, sd_k, DOUBT_LAGS_AGAIN if again else DOUBT_LAGS)
 
     @property
     def crept_s(self) -> float:
@@ -172,7 +172,7 @@ class HeatDoubt:
 
     def hot(self, gain: Gain, sd_k: float) -> bool:
         """Return whether the reading rises beyond what any power explains."""
-        return self._extra_k > LEAST_K and self._extra_k > _limit_k(gain, sd_k, EXTRA_LAGS)
+        return self._extra_k > DOUBT_K and self._extra_k > _limit_k(gain, sd_k, EXTRA_LAGS)
 
     def compare(
         self,
@@ -279,7 +279,7 @@ class HeatDoubt:
     def _creep(self, gain: Gain, reading_c: float, span_s: float, sd_k: float) -> None:
         """Notice a loss that grows while the reading stands still."""
         power = self._needed
-        if not abs(reading_c - self._stood_c) < max(STANDS_K, SDS * sd_k):
+        if not abs(reading_c - self._stood_c) < max(STANDS_K, DOUBT_SDS * sd_k):
             self._stand(gain, reading_c)
         self._stood_s += span_s
         proven = self._stood_s > COMPARED_FROM_S
@@ -289,7 +289,7 @@ class HeatDoubt:
         if proven:
             self._proven_c, self._proven_power = self._stood_c, self._stood_power
         grown = power - self._stood_power
-        least_k = max(CREPT_K, SDS * sd_k)
+        least_k = max(CREPT_K, DOUBT_SDS * sd_k)
         seen = proven and grown * gain.mean * MEMORY_S > least_k
         crept = seen and grown > clamp(self._stood_power, CREPT_LEAST, CREPT)
         self._crept_s = self._crept_s + span_s if crept else 0.0
@@ -338,4 +338,4 @@ def _missing_k(
 
 def _limit_k(gain: Gain, sd_k: float, lags: float) -> float:
     """Return the sum in K from which on it is a doubt."""
-    return max(LEAST_K, SDS * sd_k, lags * gain.stored_k)
+    return max(DOUBT_K, DOUBT_SDS * sd_k, lags * gain.stored_k)

@@ -22,7 +22,7 @@ less power and the reading obeys. Until then heat may be under way for as long a
 
 from __future__ import annotations
 
-from thermoctl.regulator.heater.doubt import LEAST_K, SDS
+from thermoctl.regulator.heater.doubt import DOUBT_K, DOUBT_SDS
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
 from thermoctl.regulator.heater.trial import RISE_K, RISE_SDS
 
@@ -131,7 +131,7 @@ class KnownHeater:
             return False
         most_k = OUTDONE * gain.mean * (now.t_s - before.t_s)
         self._outdone_k = max(0.0, self._outdone_k + now.reading_c - before.reading_c - most_k)
-        return self._outdone_k > max(LEAST_K, SDS * sd_k)
+        return self._outdone_k > max(DOUBT_K, DOUBT_SDS * sd_k)
 
     def accept(self, shown: Gain, *, more: bool = True) -> None:
         """Take for known what an answer has `shown`, if that is news.
