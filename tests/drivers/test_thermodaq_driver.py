@@ -272,6 +272,60 @@ def test_a_reset_met_by_a_write_takes_no_power() -> None:
     assert line.finished
 
 
+def test_a_board_that_takes_power_before_it_was_configured_anew_is_configured_and_gave_none() -> None:
+    board, line, clock = rig(
+        Turn(asks(4, "W", 5000, 2500), says("04 W 5000 2500 03")),
+        Turn(asks(5, "H"), says("05 H thermodaq 1 1.0.0 7 8 03")),
+        Turn(asks(6, "C", 0, 50, 10, 2500, 10_000), says(f"06 C {CONFIGURATION}")),
+    )
+    assert write(board, clock, 0.5) == 0.0
+    assert line.finished
+    assert board.health().counters["resets"] == 1
+
+
+def test_a_phase_angle_without_zero_crossings_is_a_degraded_board_and_says_why() -> None:
+    clock = ManualClock(100.0)
+    hello, configured = opening()[1], says("03 C 1 50 10 2500 10000")
+    line = Transcript(
+        clock,
+        [
+            opening()[0],
+            hello,
+            Turn(asks(3, "C", 1, 50, 10, 2500, 10_000), configured),
+            Turn(asks(4, "R"), says("04 R 5 32 3 1 0 0 00")),
+            Turn(asks(5, "R"), says("05 R 5 32 4 1 0 0 08")),
+        ],
+    )
+    chosen = ThermoDaqSettings.model_validate({"port": "p", "output_mode": "phase-angle"})
+    board = ThermoDaq(chosen, line, clock)
+    board.open(clock.now_s() + 5.0)
+    read(board, clock)
+    without = board.health()
+    read(board, clock)
+    assert without.status == "degraded"
+    assert "zero crossings" in (without.last_error or "")
+    assert board.health().status == "ok"
+
+
+def test_a_board_that_was_lost_is_not_read_before_it_has_been_opened_again() -> None:
+    board, line, clock = rig(Turn(asks(4, "R"), b"<04 R 2", disconnects=True))
+    with pytest.raises(LinkError):
+        read(board, clock)
+    with pytest.raises(LinkError, match="expected an open board"):
+        read(board, clock)
+    assert line.finished
+
+
+def test_a_board_that_was_let_go_stays_so() -> None:
+    board, _, clock = rig(Turn(asks(4, "W", 0, 1), says("04 W 0 1 00")))
+    board.close()
+    for _ in range(2):
+        with pytest.raises(LinkError):
+            read(board, clock)
+        with pytest.raises(LinkError, match="it was let go"):
+            board.open(clock.now_s() + 5.0)
+
+
 def test_a_board_that_was_exchanged_for_another_is_the_wrong_device() -> None:
     board, _, clock = rig(
         Turn(asks(4, "R"), says("04 R 5 64 3 1 0 2 03")),
