@@ -272,7 +272,7 @@ def test_a_reset_met_by_a_write_takes_no_power() -> None:
     assert line.finished
 
 
-def test_a_board_that_takes_power_before_it_was_configured_anew_is_configured_and_gave_none() -> None:
+def test_a_board_that_takes_power_before_it_is_configured_is_configured_and_gave_none() -> None:
     board, line, clock = rig(
         Turn(asks(4, "W", 5000, 2500), says("04 W 5000 2500 03")),
         Turn(asks(5, "H"), says("05 H thermodaq 1 1.0.0 7 8 03")),

@@ -241,6 +241,16 @@ def test_a_silent_client_is_let_go_but_not_one_that_watches_or_waits(house):
     assert ended(partial)
 
 
+def test_who_asks_now_and_then_is_not_taken_for_silent(house):
+    client = house.client(STATUS)
+    for _ in range(3):
+        house.clock.advance(0.8 * SILENT_S)
+        client.sendall(STATUS)
+        house.turns(2)
+    assert len(replies(client)) == 4
+    assert len(house.server._clients) == 1
+
+
 def test_a_newcomer_takes_the_place_of_the_longest_silent(house):
     first = house.client(STATUS)
     for _ in range(CLIENTS - 1):

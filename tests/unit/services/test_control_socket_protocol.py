@@ -58,6 +58,8 @@ def test_a_call_is_read_with_its_id_its_loop_and_its_argument():
         (call(do="mode", mode=""), "bad_value"),
         (call(do="status", loop=3), "bad_value"),
         (call(do="status", loop="x" * 201), "bad_value"),
+        (call(do="status", id="x" * 201), "bad_value"),
+        (call(do="status", id=10**201), "bad_value"),
         (b'{"v":1,"id":[],"do":"status"}', "bad_value"),
         (b'{"v":1,"id":true,"do":"status"}', "bad_value"),
     ],
