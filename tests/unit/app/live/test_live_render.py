@@ -36,7 +36,7 @@ anything = st.floats(allow_nan=True, allow_infinity=True)
 likely = st.floats(-50.0, 150.0)
 maybe = st.none() | st.floats(-2.0, 2.0) | anything
 words = st.text(max_size=120)
-names = st.sampled_from(["loop.started", "change.detected", "trip.over_temperature"]) | words
+names = st.sampled_from(["loop.started", "plant.changed", "trip.over_temperature"]) | words
 fields = st.dictionaries(st.sampled_from(["text", "after_c", "why", "late_s"]), anything | words)
 alarms = st.builds(
     Alarm,
@@ -346,7 +346,7 @@ def test_a_mark_shows_where_the_deviation_leaves_the_scale(
 def test_a_change_point_is_a_line_through_the_charts_and_named_once(
     sixty: LiveModel, make_cycle: MakeCycle
 ) -> None:
-    event = Event(30.0, "change.detected", {"text": "cold water, about 1.0 kg"})
+    event = Event(30.0, "plant.changed", {"text": "cold water, about 1.0 kg"})
     sixty.note(event)
     rows = texts(sixty.view(59.0))
     assert sum("14:00 Cold water" in row for row in rows) == 1
