@@ -100,6 +100,17 @@ class ControlClient:
                 raise gone from None
             return self._asked(do, patience_s, keys)
 
+    def ask_loop(self, do: str, **keys: Any) -> Mapping[str, Any]:
+        """Return the reply to a call that a loop grants, as late as the slowest loop may.
+
+        Raises
+        ------
+        Refused, NotRunning, Unavailable
+            As `ask` does.
+        """
+        patience_s = float(self.ask("status")["patience_s"])
+        return self.ask(do, patience_s + ANSWER_S, **keys)
+
     def _asked(self, do: str, patience_s: float, keys: Mapping[str, Any]) -> Mapping[str, Any]:
         self._calls += 1
         self._connection.settimeout(patience_s)

@@ -32,7 +32,6 @@ from thermoctl.services.places import runtime_dir
 from thermoctl.services.store import Latch, LatchStore
 
 _ANSWER_S = 2.5
-_REPLY_S = 5.0
 _GONE = {"active": False, "latched": False, "acknowledged": True}
 
 
@@ -131,14 +130,13 @@ def _acknowledged(
     client: ControlClient, code: str | None, loop: str | None
 ) -> list[Mapping[str, Any]]:
     """Return the alarms that were acknowledged, by the loops that have them."""
-    patience_s = float(client.ask("status")["patience_s"]) + _REPLY_S
     if code is None:
-        return list(client.ask("ack", patience_s, loop=loop)["acknowledged"])
+        return list(client.ask_loop("ack", loop=loop)["acknowledged"])
     rows = client.ask("alarms", loop=loop)["alarms"]
     meant = dict.fromkeys(row["loop"] for row in rows if row["code"] == code)
     if not meant:
         raise _no_such(code, [row["code"] for row in rows])
-    asked = (client.ask("ack", patience_s, code=code, loop=name) for name in meant)
+    asked = (client.ask_loop("ack", code=code, loop=name) for name in meant)
     return [row for reply in asked for row in reply["acknowledged"]]
 
 
@@ -219,7 +217,5 @@ def _running(directory: Path) -> bool:
 
 def _comes_back(store: LatchStore, loop: str) -> bool:
     """Return whether a daemon without a socket writes the latch again: it does, then clears it."""
-    until_s = time.monotonic() + _ANSWER_S
-    while time.monotonic() < until_s:
-        time.sleep(0.1)
+    time.sleep(_ANSWER_S)
     return store.exists(loop)

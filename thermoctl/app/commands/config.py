@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from thermoctl.app.commands.options import Commands, config_option, json_option
+from thermoctl.app.commands.service import settings_of
 from thermoctl.app.compose import wiring_errors
 from thermoctl.app.configuration.document import (
     BadConfiguration,
@@ -20,7 +21,7 @@ from thermoctl.app.configuration.new import new
 from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.configuration.toml_text import toml_text
 from thermoctl.app.doubts import doubts
-from thermoctl.app.settings import Settings, default_files, load_all, settings_in
+from thermoctl.app.settings import Settings, default_files, settings_in
 
 _REST = "how loops and boards go together is checked once this is mended"
 
@@ -82,8 +83,7 @@ def runnable(files: list[Path]) -> Settings:
 @json_option
 def show(configs: tuple[Path, ...], as_json: bool) -> None:
     """Print the configuration in force, defaults included, as TOML."""
-    settings = load_all(list(configs) or default_files())
-    content = in_force(settings)
+    content = in_force(settings_of(configs))
     click.echo(json.dumps(content, sort_keys=True) if as_json else toml_text(content), nl=as_json)
 
 

@@ -42,7 +42,6 @@ _MINUTE_S: Final = 60.0
 _SAME_K: Final = 0.005  # closer than two decimals show
 _OVER_S: Final = 1.0  # a load of 0 ends the one before, however long it lasts itself
 _MINUTES: Final = {"min": 1.0, "h": 60.0}
-_REPLY_S: Final = 5.0  # beyond what the daemon itself gives its loop
 
 
 def _temperature(text: str) -> float:
@@ -290,10 +289,9 @@ def _shown_live(socket: Path | None, loop: str | None) -> bool:
 
 
 def _asked(socket: Path | None, do: str, **keys: Any) -> Mapping[str, Any]:
-    """Return the reply to a request; it takes as long as the slowest loop may take."""
+    """Return the reply to a request."""
     with ControlClient(socket) as client:
-        patience_s = float(client.ask("status")["patience_s"])
-        return client.ask(do, patience_s + _REPLY_S, **keys)
+        return client.ask_loop(do, **keys)
 
 
 def _content(told: Mapping[str, Any]) -> dict[str, Any]:

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from thermoctl.app.commands.options import config_option, examples, state_option
+from thermoctl.app.commands.service import settings_of
 from thermoctl.app.daemon.daemon import state_for
-from thermoctl.app.settings import default_files, load_all
 from thermoctl.services.learned import LearnedStore
 from thermoctl.services.lock import DaemonLock
 from thermoctl.services.places import make_private
@@ -24,7 +24,7 @@ def forget(loop: str, configs: tuple[Path, ...], state: Path | None) -> int:
     Refused while a daemon is running: it would store again what it knows. Seldom needed, as a model
     that foresees worse than none is dropped within minutes.
     """
-    settings = load_all(list(configs) or default_files())
+    settings = settings_of(configs)
     name, _ = settings.loop(loop)
     directory = make_private(state_for(settings, state))
     with DaemonLock(directory / "daemon.lock"):

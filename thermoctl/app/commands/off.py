@@ -12,9 +12,9 @@ import click
 from pydantic import BaseModel
 
 from thermoctl.app.commands.options import config_option, state_option
+from thermoctl.app.commands.service import settings_of
 from thermoctl.app.compose import board_builder
 from thermoctl.app.daemon.daemon import locks_of, state_for
-from thermoctl.app.settings import default_files, load_all
 from thermoctl.errors import DriverError
 from thermoctl.runtime.clock import MonotonicClock
 from thermoctl.services.lock import STOP_IT
@@ -32,7 +32,7 @@ def off(configs: tuple[Path, ...], state: Path | None) -> int:
 
     Exits 1 when a board did not confirm; its dead-man then has to.
     """
-    settings = load_all(list(configs) or default_files())
+    settings = settings_of(configs)
     with ExitStack() as stack:
         for lock in locks_of(settings, make_private(state_for(settings, state)), _ASK_IT):
             stack.enter_context(lock)

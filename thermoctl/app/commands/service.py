@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -36,7 +37,7 @@ def run(configs: tuple[Path, ...], state: Path | None, socket: Path | None) -> i
     return 0 if Daemon(configs, state, socket).run() else 1
 
 
-def settings_of(configs: tuple[Path, ...]) -> Settings:
+def settings_of(configs: Sequence[Path]) -> Settings:
     """Return the settings of the files that were given, else of the machine's."""
     return load_all(list(configs) or default_files())
 

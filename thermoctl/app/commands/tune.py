@@ -26,9 +26,10 @@ from thermoctl.app.commands.options import (
 )
 from thermoctl.app.commands.order_options import candidates_option, require_auto
 from thermoctl.app.commands.results import console, make_folder, print_json, say
+from thermoctl.app.commands.service import settings_of
 from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.parts import plan_for
-from thermoctl.app.settings import Settings, default_files, load_all
+from thermoctl.app.settings import Settings, load_all
 from thermoctl.app.sim import bench_settings, default_profile, stand_ins
 from thermoctl.app.tuning.report import Report
 from thermoctl.app.tuning.run import Ran, run_on_board, run_simulated
@@ -182,7 +183,7 @@ class _Asked:
 def _settings(asked: _Asked) -> Settings:
     """Return the configuration; for a simulation, with a tank in place of every board."""
     if not asked.sim:
-        return load_all(list(asked.configs) or default_files())
+        return settings_of(asked.configs)
     given = load_all(list(asked.configs) or [default_profile()])
     say(
         f"{tank.volume_l:.3g} l heated with {tank.heater_w:.0f} W are simulated in place of board"

@@ -22,15 +22,15 @@ class Daemon:
     def __init__(self):
         self.acknowledged = []
 
-    def ask(self, do, patience_s=5.0, *, code=None, loop=None):
-        meant = [row for row in ROWS if loop in (None, row["loop"])]
-        match do:
-            case "status":
-                return {"patience_s": 2.0}
-            case "alarms":
-                return {"alarms": meant}
+    def ask(self, do, *, loop=None):
+        assert do == "alarms"
+        return {"alarms": [row for row in ROWS if loop in (None, row["loop"])]}
+
+    def ask_loop(self, do, *, code=None, loop=None):
+        assert do == "ack"
         self.acknowledged.append((code, loop))
-        return {"acknowledged": [row for row in meant if code in (None, row["code"])]}
+        rows = self.ask("alarms", loop=loop)["alarms"]
+        return {"acknowledged": [row for row in rows if code in (None, row["code"])]}
 
 
 def test_one_code_is_acknowledged_in_every_loop_that_has_it_and_nothing_else():
