@@ -205,12 +205,12 @@ def _answers(interview: _Interview) -> Answers:
     )
 
 
-def _trip(setpoint_c: float) -> tuple[float, click.FloatRange]:
+def _trip(setpoint_c: float) -> tuple[float, _Finite]:
     """Return the usual trip above a set point and what may be answered: water boils at 100."""
     usual_c = max(min(setpoint_c + _USUAL_TRIP_K, _NEAR_BOILING_C), setpoint_c + _LEAST_TRIP_K)
     if setpoint_c >= _BOILING_C:  # given as an option: then it is no water
-        return usual_c, click.FloatRange(min=setpoint_c, min_open=True)
-    return min(usual_c, _BOILING_C), click.FloatRange(setpoint_c, _BOILING_C, min_open=True)
+        return usual_c, _Finite(min=setpoint_c, min_open=True)
+    return min(usual_c, _BOILING_C), _Finite(setpoint_c, _BOILING_C, min_open=True)
 
 
 def commented(answers: Answers) -> str:

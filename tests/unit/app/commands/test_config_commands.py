@@ -406,6 +406,13 @@ def test_an_answer_beyond_what_can_be_is_told_by_its_option(run, option, value):
     assert f"answers: {option}: expected at " in err
 
 
+def test_a_trip_that_is_answered_with_no_number_is_asked_for_again():
+    result = CliRunner().invoke(cli, ["config", "new"], input="\n\n\n\n\nnan\n60\n\n\n")
+    assert result.exit_code == 0, result.stderr
+    assert "expected a finite number, got nan" in result.stderr
+    assert load(tomllib.loads(result.stdout)).loops["tank"].trip_above_c == 60.0
+
+
 def test_the_end_of_input_is_a_wrong_use_on_a_line_of_its_own():
     result = CliRunner().invoke(cli, ["config", "new"], input="simulated\n")
     assert result.exit_code == 2
