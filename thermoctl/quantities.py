@@ -21,6 +21,9 @@ _NUMBERS = (int, float, np.integer, np.floating)
 ZERO_CELSIUS_K = 273.15
 """0 degC in kelvin, exact by definition."""
 
+WATER_J_PER_L_K = 4186.0
+"""Heat that warms a litre of water by a kelvin, as litres are reckoned from watts."""
+
 
 class Uncertain(NamedTuple):
     """A quantity and its standard deviation, in one unit; NaN where nothing is known."""

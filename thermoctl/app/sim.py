@@ -13,12 +13,11 @@ from thermoctl.app.configuration.tables import ActuatorTable, LoopTable, SensorT
 from thermoctl.app.parts import COOL, action_of, plan_for
 from thermoctl.app.settings import Settings, load
 from thermoctl.errors import ConfigError
-from thermoctl.quantities import clamp
+from thermoctl.quantities import WATER_J_PER_L_K, clamp
 from thermoctl.runtime.clock import SimulatedClock
 from thermoctl.signals import Cycle, Mode
 from thermoctl_drivers.simulated import SECOND_INPUT, SimulatedSettings
 
-WATER_J_PER_LK = 4186.0  # heat of a litre of water, in J/K
 _STAND_IN_W = 1500.0
 _COOLER = {"output": "cooler", "law": "linear"}
 _VOLUMES_L, _POWERS_W = (0.5, 200.0), (50.0, 5000.0)
@@ -117,9 +116,9 @@ def _tank_for(board: str, settings: Settings, mains_hz: float) -> SimulatedSetti
                     f"loop {loop!r} cannot be simulated: expected its heater and its cooler on one "
                     f"board, got {', '.join(each.board for each in table.outputs)}"
                 )
-            litres = _STAND_IN_W / (WATER_J_PER_LK * table.model.gain_k_per_s)
+            litres = _STAND_IN_W / (WATER_J_PER_L_K * table.model.gain_k_per_s)
             volume_l = clamp(litres, *_VOLUMES_L)
-            heater_w = clamp(WATER_J_PER_LK * volume_l * table.model.gain_k_per_s, *_POWERS_W)
+            heater_w = clamp(WATER_J_PER_L_K * volume_l * table.model.gain_k_per_s, *_POWERS_W)
             try:
                 return SimulatedSettings(
                     volume_l=volume_l,

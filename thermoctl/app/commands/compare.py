@@ -28,9 +28,10 @@ from thermoctl.app.configuration.tables import LoopTable, Options
 from thermoctl.app.parts import plan_for
 from thermoctl.app.plugins import BadOption
 from thermoctl.app.settings import load
-from thermoctl.app.sim import WATER_J_PER_LK, profile
+from thermoctl.app.sim import profile
 from thermoctl.errors import ConfigError, Refused, Unavailable
 from thermoctl.plant.parameters import TankParameters
+from thermoctl.quantities import WATER_J_PER_L_K
 from thermoctl.regulator import Plan
 from thermoctl.studies.compare.baselines import BASELINES, options_for, require
 from thermoctl.studies.compare.figure import MOST_DRAWN, draw_comparison
@@ -117,7 +118,7 @@ def _plan(table: LoopTable, where: Plant, *, nameplate: bool, fitted: bool) -> P
         table = _fitted(table, where.usage)
     tank = where.parameters
     if nameplate and isinstance(tank, TankParameters):
-        table = _told(table, tank.element.rated_w / (WATER_J_PER_LK * tank.vessel.volume_l))
+        table = _told(table, tank.element.rated_w / (WATER_J_PER_L_K * tank.vessel.volume_l))
     kind = table.controller.kind
     if kind not in BASELINES:
         return plan_for(table)

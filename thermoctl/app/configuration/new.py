@@ -22,8 +22,8 @@ from thermoctl.app.reach import reach_c
 from thermoctl.app.settings import settings_in
 from thermoctl.control.adaptive import Adaptive
 from thermoctl.errors import ConfigError, Refused
+from thermoctl.quantities import WATER_J_PER_L_K
 
-_WATER_J_PER_L_K = 4186.0
 _USUAL_TRIP_K, _LEAST_TRIP_K = 20.0, 2.0  # how far a trip that nobody named is from the set point
 _NEAR_BOILING_C, _BOILING_C = 95.0, 100.0
 _CURVES = list(SensorTable.model_json_schema()["properties"]["curve"]["enum"])
@@ -71,7 +71,7 @@ class Answers:
     @property
     def gain_k_per_s(self) -> float:
         """Heating rate at full power, in K/s."""
-        return self.heater_w / (_WATER_J_PER_L_K * self.volume_l)
+        return self.heater_w / (WATER_J_PER_L_K * self.volume_l)
 
     @property
     def setpoint_max_c(self) -> float:
@@ -245,7 +245,7 @@ def _loop_lines(answers: Answers) -> list[str]:
     stage = plugins.find(plugins.DRIVERS, answers.kind).Settings.model_fields.get("power_stage")
     pull_up = [] if answers.pull_up_ohm is None else [_line("pull_up_ohm", answers.pull_up_ohm)]
     gain = float(f"{answers.gain_k_per_s:.3g}")
-    size = f"{answers.heater_w:g} W / (4186 J/(l K) x {answers.volume_l:g} l)"
+    size = f"{answers.heater_w:g} W / ({WATER_J_PER_L_K:g} J/(l K) x {answers.volume_l:g} l)"
     return [
         "[loops.tank]",
         _line("setpoint_c", answers.setpoint_c, "degC to hold"),

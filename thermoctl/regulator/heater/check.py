@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
-from thermoctl.quantities import clamp
+from thermoctl.quantities import WATER_J_PER_L_K, clamp
 from thermoctl.ranges import check_ranges, ranged
 
 WEAKEST_K_PER_S = 6e-5
 """Least gain in K/s of a healthy plant where nothing is configured: 50 W in 200 l."""
-LARGEST_J_PER_K = 400.0 * 4186.0
+LARGEST_J_PER_K = 400.0 * WATER_J_PER_L_K
 """Largest heat capacity of a plant in J/K: twice that of 200 l of water, to allow for the vessel
 and for losses meanwhile."""
 
