@@ -24,6 +24,7 @@ import click
 from thermoctl import __version__
 from thermoctl.app.compose import loop_for
 from thermoctl.app.cycle_record import as_line
+from thermoctl.app.daemon.beside import order_service
 from thermoctl.app.daemon.insight_watch import InsightService, insights_for
 from thermoctl.app.doubts import doubts
 from thermoctl.app.live import Action, Desk, Facts, Keys, LiveModel, LiveScreen, look_for
@@ -82,7 +83,7 @@ def run_bench(settings: Settings, options: BenchOptions) -> None:
             sinks.append(stack.enter_context(_recorded(settings, options.history)))
         summary = Summary()
         sinks.append(summary.add)
-        orders = _orders_beside(settings, loop)
+        orders = order_service(settings.loops, _reports(loop))
         if orders is not None:
             sinks.append(orders.step)
         if options.as_json:
@@ -118,15 +119,6 @@ def _tell(summary: Summary, options: BenchOptions) -> None:
     look = look_for(sys.stderr.encoding)
     for line in closing_lines(figures):
         click.echo(printable(line, utf8=look.utf8), err=True)
-
-
-def _orders_beside(settings: Settings, loop: Loop) -> OrderService | None:
-    """Return what weighs orders beside the loops, where one asks for it; without a thread."""
-    if not any(table.weighs_orders for table in settings.loops.values()):
-        return None
-    from thermoctl.app.daemon.order_watch import OrderService, watches_for
-
-    return OrderService(watches_for(settings.loops), _reports(loop))
 
 
 def _reports(loop: Loop) -> Callable[..., None]:

@@ -15,10 +15,10 @@ import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from thermoctl import __version__
 from thermoctl.app.compose import loop_for
+from thermoctl.app.daemon.beside import order_service
 from thermoctl.app.daemon.clerk import Clerk
 from thermoctl.app.daemon.insight_watch import InsightService, insights_for
 from thermoctl.app.daemon.resuming import Resumption, kept_latches
@@ -39,9 +39,6 @@ from thermoctl.services.notify import Notifier, watchdog_interval_s
 from thermoctl.services.places import make_private, runtime_dir, state_dir
 from thermoctl.services.store import LatchStore
 from thermoctl.signals import Acknowledge, Cycle, Event, SetPoint
-
-if TYPE_CHECKING:
-    from thermoctl.app.daemon.order_watch import OrderService
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 _TURN_S = 0.2
@@ -120,7 +117,7 @@ class Daemon:
         self._keeper = LatchKeeper(
             self._latches, self._acknowledged_on_disk, report=self._journal.emit
         )
-        self._orders = _order_service(settings, self._emit)
+        self._orders = order_service(settings.loops, self._emit)
         self._insight = InsightService(insights_for(settings.loops), self._emit)
         self._clients = self._control_socket(directory, socket)
         self._off = self._failed = self._ready = False
@@ -304,15 +301,6 @@ def _history(
         return None
     run = RunInfo(__version__, settings.as_json())
     return HistoryWriter(directory / settings.history.file, run, report=report)
-
-
-def _order_service(settings: Settings, emit: Callable[..., None]) -> OrderService | None:
-    """Return what weighs orders beside the loops; None, and nothing loaded, where none does."""
-    if not any(table.weighs_orders for table in settings.loops.values()):
-        return None
-    from thermoctl.app.daemon.order_watch import OrderService, watches_for
-
-    return OrderService(watches_for(settings.loops), emit)
 
 
 def _require_patient_watchdog(settings: Settings) -> None:

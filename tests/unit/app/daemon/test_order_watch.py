@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from thermoctl.app.cycle_record import as_line
-from thermoctl.app.daemon.daemon import _order_service
+from thermoctl.app.daemon.beside import order_service
 from thermoctl.app.daemon.order_watch import Finding, OrderService, OrderWatch, watches_for
 from thermoctl.app.settings import load
 from thermoctl.app.sim import bench_settings, simulate
@@ -178,8 +178,8 @@ def test_a_configuration_names_candidates_or_takes_the_usual_ones():
     assert list(watches) == ["a", "b"]
     assert watches["a"]._orders == (Order(1, 1, 1), Order(2, 1, 3))
     assert len(watches["b"]._orders) == 72
-    assert _order_service(settings, lambda *a, **k: None) is not None
-    assert _order_service(load({"loops": {"d": TABLE}}), lambda *a, **k: None) is None
+    assert order_service(settings.loops, lambda *a, **k: None) is not None
+    assert order_service(load({"loops": {"d": TABLE}}).loops, lambda *a, **k: None) is None
 
 
 @pytest.mark.parametrize(
