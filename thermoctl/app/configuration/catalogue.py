@@ -143,17 +143,19 @@ def schema() -> dict[str, Any]:
     boards = [_board_schema(kind, definitions) for kind in plugins.kinds(plugins.DRIVERS)]
     whole["properties"]["boards"]["additionalProperties"] = {"oneOf": boards}
     loop = definitions["LoopTable"]["properties"]
-    controllers = [_law_schema(plugins.CONTROLLERS, kind, {}) for kind in _kinds("controllers")]
+    kinds = list(plugins.kinds(plugins.CONTROLLERS))
+    controllers = [_law_schema(plugins.CONTROLLERS, kind, {}) for kind in kinds]
     for key in ("controller", "shadow"):
         default = LoopTable.model_fields[key].get_default(call_default_factory=True)
         loop[key] = {
             "description": loop[key]["description"],
             "default": None if default is None else default.model_dump(),
-            "anyOf": [{"enum": _kinds("controllers")}, *controllers],
+            "anyOf": [{"enum": kinds}, *controllers],
         }
     shared = dict(definitions["EstimatorTable"]["properties"])
     del shared["kind"]
-    estimators = [_law_schema(plugins.ESTIMATORS, kind, shared) for kind in _kinds("estimators")]
+    group = plugins.ESTIMATORS
+    estimators = [_law_schema(group, kind, shared) for kind in plugins.kinds(group)]
     loop["estimator"] = {
         "description": first_line(EstimatorTable),
         "default": {"kind": EstimatorTable().kind},
@@ -163,10 +165,6 @@ def schema() -> dict[str, Any]:
         definitions.pop(unused, None)
     _add_units(whole)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **whole}
-
-
-def _kinds(group: str) -> list[str]:
-    return list(plugins.kinds(f"thermoctl.{group}"))
 
 
 def _board_schema(kind: str, definitions: dict[str, Any]) -> dict[str, Any]:
