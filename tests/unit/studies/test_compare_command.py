@@ -55,6 +55,7 @@ def test_a_nameplate_tells_the_model_litres_and_watts():
     ("text", "words"),
     [
         ("bang", "no controller is called 'bang'; known: .*on-off.*simple-pid"),
+        ("simple_pid", "no controller is called 'simple_pid'; did you mean 'simple-pid'"),
         ("on-off:hysteresis=1", "hysteresis"),
         ("on-off:hysteresis_k", "expected kind:option=value"),
         ("on-off:hysteresis_k=-1", "at least 0, got -1"),

@@ -83,7 +83,7 @@ def contender(
     """
     kind, _, rest = text.partition(":")
     if kind not in known_kinds():
-        raise BadOption(f"no controller is called {kind!r}; known: {', '.join(known_kinds())}")
+        raise BadOption(f"no controller is called {kind!r}{plugins.nearest(kind, known_kinds())}")
     if kind in BASELINES:
         require(kind)
     options = _options(text, rest)
