@@ -26,9 +26,12 @@ class Duration(click.ParamType):  # type: ignore[type-arg]  # no parameter befor
         if not isinstance(value, str):
             return value
         match = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*([a-z]*)\s*", value)
-        if match is None or match[2] not in _UNITS_S or not float(match[1]) > 0.0:
+        duration_s = math.nan
+        if match is not None:
+            duration_s = float(match[1]) * _UNITS_S.get(match[2], math.nan)
+        if not 0.0 < duration_s < math.inf:
             self.fail(f"expected a duration such as 90s, 10m or 1h, got {value!r}", param, ctx)
-        return float(match[1]) * _UNITS_S[match[2]]
+        return duration_s
 
 
 class Speed(click.ParamType):  # type: ignore[type-arg]

@@ -93,12 +93,11 @@ def _moment(text: str | None) -> datetime | None:
         return None
     try:
         return datetime.fromisoformat(text).astimezone(UTC)
-    except ValueError:
+    except (ValueError, OverflowError):  # no time at all, or none of the calendar
         pass
     try:
-        age_s = DURATION.convert(text, None, None)
-    except click.BadParameter as error:
+        return datetime.now(UTC) - timedelta(seconds=DURATION.convert(text, None, None))
+    except (click.BadParameter, OverflowError) as error:
         raise click.UsageError(
             f"expected an age such as 24h or a time such as 2026-01-31T12:00+01:00, got {text!r}"
         ) from error
-    return datetime.now(UTC) - timedelta(seconds=age_s)
