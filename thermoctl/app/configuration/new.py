@@ -77,7 +77,7 @@ class Answers:
     def setpoint_max_c(self) -> float:
         """Highest set point: a tenth of the way back from the trip, but with headroom."""
         room_k = max(0.1 * (self.trip_above_c - self.setpoint_c), HEADROOM_K)
-        downwards = math.floor(100.0 * (self.trip_above_c - room_k) + 1e-6) / 100.0
+        downwards = round(self.trip_above_c - room_k - 0.005 + 1e-8, 2)
         return max(downwards, self.setpoint_c)
 
 

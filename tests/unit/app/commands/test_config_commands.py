@@ -398,7 +398,13 @@ def test_an_answer_that_is_no_number_is_told_by_the_option_it_was_given_to(run, 
 
 
 @pytest.mark.parametrize(
-    ("option", "value"), [("--heater-w", "1e9"), ("--volume-l", "1e9"), ("--setpoint-c", "-280")]
+    ("option", "value"),
+    [
+        ("--heater-w", "1e9"),
+        ("--volume-l", "1e9"),
+        ("--setpoint-c", "-280"),
+        ("--trip-above-c", "1e307"),
+    ],
 )
 def test_an_answer_beyond_what_can_be_is_told_by_its_option(run, option, value):
     code, _, err = run("config", "new", "--yes", option, value)
