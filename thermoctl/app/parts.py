@@ -109,14 +109,16 @@ def part_errors(table: LoopTable, *, whole: bool = True) -> Iterator[BadOption]:
     if whole:
         yield from _beyond_reach(table)
     content: Mapping[str, Any] = table.model_dump(exclude_unset=True)
+    told: set[tuple[str, ...]] = set()
     while True:
         try:
             _build(table)
             return
         except BadOption as error:
             path = error.path
-            if whole or (len(path) > 1 and path[-1] != "action"):
+            if whole or (len(path) > 1 and path[-1] != "action" and path not in told):
                 yield error
+            told.add(path)
         rest = without(content, path[:-1] if path[-1:] == ("kind",) else path) if path else content
         left = repaired(rest)
         if rest == content or left is None:

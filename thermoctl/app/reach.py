@@ -11,6 +11,7 @@ from thermoctl.model.sensor import Sensor
 
 _ROOM_C, _ROOM_VOLTS = 25.0, ("lm335", "lm35", "tmp36")  # which are made to show that
 _HALVINGS = 50
+_LEAST_K = 1.0
 
 
 def reach_errors(table: LoopTable, part: str, sensor: Sensor) -> Iterator[BadOption]:
@@ -19,6 +20,11 @@ def reach_errors(table: LoopTable, part: str, sensor: Sensor) -> Iterator[BadOpt
     Beyond its ends a sensor counts as broken, so a trip out there would never act.
     """
     coldest_c, hottest_c = reach_c(sensor)
+    resistor_ohm = getattr(table, part).pull_up_ohm
+    if resistor_ohm is not None and not hottest_c - coldest_c > _LEAST_K:  # NaN is no reach at all
+        text = "expected a resistor with which the converter can tell the sensor's temperatures"
+        yield BadOption(f"{text}, got {resistor_ohm:g} ohm", (part, "pull_up_ohm"))
+        return
     if not coldest_c < table.setpoint_c < hottest_c:
         if getattr(table, part).curve in _ROOM_VOLTS and not coldest_c < _ROOM_C < hottest_c:
             text = f"expected a converter that can show a room, got {sensor.reference_v:g} V"

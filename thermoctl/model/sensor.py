@@ -227,9 +227,10 @@ class Beta:
 
     def temperature_c(self, ohm: float) -> float:
         """Return the temperature in degC at `ohm`; NaN where there is none."""
-        if not (ohm > 0.0 and math.isfinite(ohm)):
+        ratio = ohm / self.r25_ohm
+        if not 0.0 < ratio < math.inf:
             return NAN
-        inverse_k = 1.0 / (25.0 + ZERO_CELSIUS_K) + math.log(ohm / self.r25_ohm) / self.beta_k
+        inverse_k = 1.0 / (25.0 + ZERO_CELSIUS_K) + math.log(ratio) / self.beta_k
         return 1.0 / inverse_k - ZERO_CELSIUS_K if inverse_k > 0.0 else NAN
 
     def ohm(self, temperature_c: float) -> float:
@@ -360,8 +361,8 @@ class Sensor:
         _positive("reference_v", self.reference_v)
         if not 0.0 <= self.short_below < self.open_above <= 1.0:
             raise ValueError(
-                "short_below and open_above must obey 0 <= short_below < open_above <= 1, "
-                f"got {self.short_below!r} and {self.open_above!r}"
+                "short_below must be at least 0 and less than open_above "
+                f"({self.open_above!r}, at most 1), got {self.short_below!r}"
             )
 
     def measure(self, raw: RawSample | None, t_s: float = NAN) -> Measurement:

@@ -57,3 +57,15 @@ def test_a_lower_trip_out_of_reach_is_refused_only_when_it_was_given():
 def test_a_setpoint_that_the_sensor_cannot_show_is_refused():
     with pytest.raises(ConfigError, match=r"tank\.setpoint_c: .* 277\.7 to 850\.0 °C, got 37\.5"):
         load(holding({"curve": "pt100", "pull_up_ohm": 1e4}))
+
+
+@pytest.mark.parametrize(
+    ("curve", "pull_up_ohm"),
+    [("pt100", 1e-3), ("pt100", 1e6), ("pt1000", 1e308), ("ntc", 5e-324), ("ntc", 1e308)],
+)
+def test_a_resistor_that_shows_a_converter_nothing_is_refused(curve, pull_up_ohm):
+    with pytest.raises(ConfigError) as refused:
+        load(holding({"curve": curve, "pull_up_ohm": pull_up_ohm}))
+    text = "expected a resistor with which the converter can tell the sensor's temperatures, got "
+    key = "configuration: loops.tank.sensor.pull_up_ohm: "
+    assert str(refused.value) == f"{key}{text}{pull_up_ohm:g} ohm"

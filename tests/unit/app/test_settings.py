@@ -171,6 +171,19 @@ def test_a_setpoint_that_is_no_temperature_is_refused(minimal, value, came):
         ({"jump_k": 0}, "jump_k: expected a number above 0, got 0"),
         ({"sensor": "daq"}, 'sensor: expected a table, got "daq"'),
         ({"sensor": {}}, "sensor.board: expected a value, got none"),
+        (
+            {"sensor": {"board": "daq", "calibration_gain": 2.0}},
+            "sensor.calibration_gain: expected at most 1.25, got 2.0",
+        ),
+        (
+            {"sensor": {"board": "daq", "calibration_offset_k": -30}},
+            "sensor.calibration_offset_k: expected at least -20, got -30",
+        ),
+        (
+            {"sensor": {"board": "daq", "open_above": 0.0, "short_below": 0.5}},
+            "sensor.short_below: expected at least 0 and less than open_above (0.0, at most 1), "
+            "got 0.5",
+        ),
         ({"controller": 3}, "controller: expected a table, got 3"),
         ({"controller": "mpc"}, "controller.kind: no controller is called 'mpc'"),
         ({"model": {"n": 2.0}}, "model.n: expected a whole number, got 2.0"),
@@ -187,6 +200,7 @@ def test_a_setpoint_that_is_no_temperature_is_refused(minimal, value, came):
     ],
 )
 def test_a_bad_key_of_a_loop_is_named_with_what_was_expected(minimal, keys, told):
+    minimal["boards"] = {"daq": {"kind": "simulated"}}
     [problem] = problems(tank(minimal, **keys))
     assert problem.startswith(f"configuration: loops.tank.{told}")
 

@@ -155,6 +155,12 @@ def test_a_resistance_off_its_curve_is_a_fault_on_the_nearer_side(fraction, qual
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True)
 
 
+@pytest.mark.parametrize("r25_ohm", [5e-324, 10_000.0, 1e308])
+@pytest.mark.parametrize("ohm", [5e-324, 1e308])
+def test_a_thermistor_whose_resistance_is_beyond_every_ratio_is_off_its_curve(ohm, r25_ohm):
+    assert not Beta(r25_ohm).temperature_c(ohm) > 1e6
+
+
 @pytest.mark.parametrize("name", CONVERSIONS)
 @quickly
 @given(counts=ANYTHING, full_scale=ANYTHING)

@@ -58,8 +58,10 @@ class SensorTable(Table):
         "lm335", description="Law from volts to degC."
     )
     reference_v: Positive = Field(5.0, description="Volts at full scale of the converter.")
-    calibration_gain: Positive = Field(1.0, description="One-point calibration: a factor on volts.")
-    calibration_offset_k: Finite = Field(0.0, description="Added after the curve.")
+    calibration_gain: float = Field(
+        1.0, ge=0.8, le=1.25, description="One-point calibration: a factor on volts."
+    )
+    calibration_offset_k: float = Field(0.0, ge=-20, le=20, description="Added after the curve.")
     pull_up_ohm: Positive | None = Field(None, description="Series resistor of pt100, pt1000, ntc.")
     supply_v: Positive | None = Field(None, description="Voltage across it; reference_v if absent.")
     beta_k: Positive = Field(3950.0, description="Beta of an ntc.")
@@ -319,7 +321,6 @@ class LoopTable(Table):
     orders: OrdersTable | None = Field(
         None, description="Table of the orders that are weighed beside the loop; none when absent."
     )
-
     heater_check: HeaterCheckTable = Field(default_factory=HeaterCheckTable)
 
     @field_validator("controller", "shadow", mode="before")
@@ -393,7 +394,6 @@ class ServiceTable(Table):
     state_directory: str | None = Field(
         None, description="Folder of latches and history, when it is not the usual one."
     )
-
     accept_no_dead_man: bool = Field(
         False, description="Run a board that cannot switch its output off by itself."
     )
