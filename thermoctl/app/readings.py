@@ -40,7 +40,7 @@ def _coarse(settings: Settings, name: str) -> str:
     k_per_mv = step_k * 2.0**bits / (1e3 * sensor.reference_v)
     noise_k = k_per_mv * getattr(board, "noise_mv", 0.0)
     pickup_k = k_per_mv * getattr(board, "pickup_mv", 0.0)
-    once_k = math.sqrt(step_k**2 / 12.0 + noise_k**2 + pickup_k**2 / 2.0)
+    once_k = math.hypot(step_k / math.sqrt(12.0), noise_k, pickup_k / math.sqrt(2.0))
     where = f"boards.{table.sensor.board}"
     if step_k > _FEW_BITS_K:
         advice = f"take a converter of more bits, 10 with conversions = {USUAL} at least"

@@ -24,6 +24,7 @@ from thermoctl.app.configuration.tables import (
     SensorTable,
     ServiceTable,
 )
+from thermoctl.app.doubts import doubts
 from thermoctl.app.settings import load, load_all
 from thermoctl.errors import ConfigError
 from thermoctl_drivers.simulated import SimulatedSettings
@@ -187,6 +188,7 @@ def test_a_setpoint_that_is_no_temperature_is_refused(minimal, value, came):
         ({"controller": 3}, "controller: expected a table, got 3"),
         ({"controller": "mpc"}, "controller.kind: no controller is called 'mpc'"),
         ({"model": {"n": 2.0}}, "model.n: expected a whole number, got 2.0"),
+        ({"model": {"gain_k_per_s": 1e308}}, "model.gain_k_per_s: expected at most 1e+06, got"),
         ({"estimator": {"kind": "ckv"}}, "estimator.kind: no estimator is called 'ckv'; did you"),
         ({"estimator": {"kind": "ckf", "R3": 1}}, "estimator.R3: unknown key; known: R1, R2, infl"),
         ({"estimator": {"kind": "vff"}}, "estimator.Sigma0: expected a value, got none"),
@@ -565,6 +567,20 @@ def test_no_content_whatever_raises_anything_but_a_config_error(value):
     content = value if isinstance(value, dict) else {"loops": value}
     with contextlib.suppress(ConfigError):
         load(content)
+
+
+@pytest.mark.parametrize("value", [5e-324, 1e-300, 1e308, -1e308])
+@pytest.mark.parametrize("curve", ["lm335", "ntc", "linear"])
+def test_no_number_in_any_key_raises_anything_but_a_config_error(curve, value):
+    for table, key in KEYS:
+        content = tomllib.loads(WHOLE)
+        content["loops"]["tank"]["sensor"] |= {"curve": curve, "pull_up_ohm": 1e4}
+        inner = content
+        for part in table.split("."):
+            inner = inner.setdefault(part, {})
+        inner[key] = value
+        with contextlib.suppress(ConfigError):
+            doubts(load(content))
 
 
 # -- who may write it ------------------------------------------------------------------------------

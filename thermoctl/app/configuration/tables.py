@@ -191,7 +191,7 @@ class ModelTable(Table):
         "known-gain",
         description="known-gain: y(t) = a y(t-1) + b u(t-1), b given; arx: everything learnt.",
     )
-    gain_k_per_s: Positive = Field(
+    gain_k_per_s: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
         0.0449,
         description="Heating rate at full power; 1,500 W in 8 l gives 0.0449. arx: the first "
         "guess, and a fifth of it the least gain that is believed while the guards are on.",
