@@ -169,7 +169,7 @@ class PlantBelief:
 class Feasible:
     """What is said of a set point before it is reached; NaN where not known.
 
-    Reckoned every ten seconds or so, from a balance of heat that is kept beside every controller.
+    Computed every ten seconds or so, from a balance of heat that is kept beside every controller.
 
     Parameters
     ----------
@@ -326,7 +326,7 @@ class Step:
     def plant(self) -> PlantBelief | None:
         """What the controller in charge, or else the one in shadow, believes of it.
 
-        None where neither has words for it. Reckoned when asked for, from a belief that is frozen:
+        None where neither has words for it. Computed when asked for, from a belief that is frozen:
         whoever asks pays, in any thread, and the loop never does.
         """
         return self.tell()

@@ -5,7 +5,7 @@ much is stored, whatever happens,
 
 .. math:: s = k P L
 
-All is reckoned with the upper bounds of gain and lag. Explained in ``docs/tune.md``.
+All is computed with the upper bounds of gain and lag. Explained in ``docs/tune.md``.
 """
 
 from __future__ import annotations

@@ -80,7 +80,7 @@ class SelfTuningGpc:
             + \lambda \sum_{i=1}^{N_u} \Delta u_i^2
 
     The model is one of block means; it is learnt at every sample, whoever steers, and needs no
-    settings. Only the first of the powers is given, and at the next sample all is reckoned anew.
+    settings. Only the first of the powers is given, and at the next sample all is computed anew.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ class FeasibilitySides:
             self._cooler.reckon(cold, t_s)
 
     def fail(self, failure: Failure) -> None:
-        """Forget what could not be reckoned with, and say so once."""
+        """Begin anew after a computation that failed, and say so once."""
         self._cooler.forget()
         self._heater.fail(failure)
 
