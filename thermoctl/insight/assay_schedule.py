@@ -48,7 +48,7 @@ class AssaySchedule:
         self._from_s = self._assayed_s = t_s
 
     def after(self, t_s: float, rest: Rest) -> Assay | None:
-        """Return what the last move says, once that can be reckoned."""
+        """Return what the last move says, once that can be computed."""
         lasts_s = rest.lasts_s(t_s)
         if lasts_s == 0.0:
             return None

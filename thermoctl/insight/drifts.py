@@ -53,8 +53,8 @@ class Compared:
         return self.share > RELEASED * share if share < 0.0 else self.share < RELEASED * share
 
 
-class Lasting:
-    """Whether a comparison stands; several in a row begin it, and end it.
+class Hysteresis:
+    """Whether a comparison stands: it begins at `share`, and ends at half of it.
 
     Parameters
     ----------

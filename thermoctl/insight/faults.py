@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from thermoctl.insight.drifts import Baseline, Compared, Lasting
+from thermoctl.insight.drifts import Baseline, Compared, Hysteresis
 from thermoctl.insight.values import Drift
 from thermoctl.insight.wording import plain
 from thermoctl.quantities import Uncertain
@@ -46,8 +46,8 @@ class Faults:
 
     def __init__(self) -> None:
         self._active: dict[str, Drift] = {}
-        self._more_power, self._more_noise = Lasting(POWER_UP, 2), Lasting(NOISE_UP, 2)
-        self._water, self._element = Lasting(GAIN_UP, 1), Lasting(GAIN_DOWN, 1)
+        self._more_power, self._more_noise = Hysteresis(POWER_UP, 2), Hysteresis(NOISE_UP, 2)
+        self._water, self._element = Hysteresis(GAIN_UP, 1), Hysteresis(GAIN_DOWN, 1)
         self._first: Uncertain | None = None
         self._diluted = 1.0
         self._up_for = 0
@@ -87,7 +87,7 @@ class Faults:
         """Note that cold water may have come in, as a `share` of what was there."""
         self._diluted /= 1.0 + share
 
-    def reckon(self, t_s: float, gain: Uncertain) -> Compared | None:
+    def take_gain(self, t_s: float, gain: Uncertain) -> Compared | None:
         """Take the gain of a move; return the comparison if it changed what stands."""
         if self._first is None:
             self._first = gain

@@ -1,6 +1,6 @@
 """The power as the sensor comes to feel it: behind a dead time and two lags.
 
-The total lag is divided as the first shape of the bank divides it. What is reckoned here takes in
+The total lag is divided as the first shape of the bank divides it. What is computed here takes in
 heat over some lags at least, for which the shape hardly matters.
 """
 

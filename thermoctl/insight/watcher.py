@@ -211,7 +211,7 @@ class Insights:
             self._changes.appendleft(jump_at(t_s))
 
     def _assayed(self, known: _WatchedPlant, t_s: float, found: Assay) -> None:
-        compared = self._faults.reckon(t_s, found.gain)
+        compared = self._faults.take_gain(t_s, found.gain)
         known.take(found, self._applied)
         if compared is not None:
             self._changes.appendleft(change_of_gain(self._rest.moved_s, compared))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from thermoctl.insight.drifts import Baseline, Compared, Lasting
+from thermoctl.insight.drifts import Baseline, Compared, Hysteresis
 from thermoctl.insight.faults import ELEMENT, LOSS, NORMAL_AFTER, WATER, WIRING, Faults
 from thermoctl.quantities import Uncertain
 
@@ -60,7 +60,9 @@ def test_noise_that_doubled_is_named():
 def gains(*values, diluted=0.0):
     faults = Faults()
     faults.add_cold(diluted)
-    told = [faults.reckon(float(k), Uncertain(each, 0.01 * each)) for k, each in enumerate(values)]
+    told = [
+        faults.take_gain(float(k), Uncertain(each, 0.01 * each)) for k, each in enumerate(values)
+    ]
     return faults, told
 
 
@@ -92,7 +94,7 @@ def test_a_gain_within_what_two_moves_differ_by_is_no_news():
 def test_a_weak_element_explains_the_power_to_hold():
     faults = turned(around(0.19, 12) + around(0.26, 4))
     for value in (0.044, 0.031):
-        faults.reckon(5000.0, Uncertain(value, 0.01 * value))
+        faults.take_gain(5000.0, Uncertain(value, 0.01 * value))
     assert set(faults.active) == {ELEMENT}
 
 
@@ -103,11 +105,11 @@ def test_a_large_drift_within_its_own_error_is_none():
 
 
 def test_a_condition_between_beginning_and_ending_stays_what_it_is():
-    lasting, half = Lasting(0.2, 2), Compared(Uncertain(1.0, 0.01), Uncertain(1.15, 0.01))
+    drifted, half = Hysteresis(0.2, 2), Compared(Uncertain(1.0, 0.01), Uncertain(1.15, 0.01))
     full = Compared(Uncertain(1.0, 0.01), Uncertain(1.3, 0.01))
-    assert [lasting.after(each) for each in (half, half, full, full)] == [False, False, False, True]
-    assert [lasting.after(half) for _ in range(5)] == [False] * 5
-    assert lasting.stands
+    assert [drifted.after(each) for each in (half, half, full, full)] == [False, False, False, True]
+    assert [drifted.after(half) for _ in range(5)] == [False] * 5
+    assert drifted.stands
 
 
 def test_a_baseline_that_is_not_to_follow_stays():
