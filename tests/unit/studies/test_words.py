@@ -2,24 +2,7 @@ import math
 
 import pytest
 
-from thermoctl.insight.wording import number
 from thermoctl.studies.words import counted, duration, probability
-
-
-@pytest.mark.parametrize(
-    ("value", "sd", "words"),
-    [
-        (-0.46410, 0.0657, "−0.46 ± 0.13"),
-        (0.999764, 0.00003, "0.999764 ± 0.000060"),
-        (41.26, 6.0, "41 ± 12"),
-        (2.0, 0.0, "2 ± 0"),
-        (-1e140, 1e130, "−1e+140 ± 2e+130"),
-        (math.nan, 1.0, "–"),
-        (1.0, math.inf, "–"),
-    ],
-)
-def test_a_value_has_the_decimals_its_error_deserves(value, sd, words):
-    assert number(value, sd) == words
 
 
 @pytest.mark.parametrize(
