@@ -204,3 +204,9 @@ def test_a_misspelt_option_would_be_noticed():
     (words,) = calls("sudo thermoctl --sim --sped 60 --json | head -n 3")
     assert words == ["--sim", "--sped", "60", "--json"]
     assert misspelt(words) == ["--sped"]
+
+
+def test_every_decision_has_a_place_among_the_subjects():
+    folder = TOP / "docs" / "decisions"
+    listed = re.findall(r"\((\d{4}-[^)]*)\)", text_of(folder / "README.md"))
+    assert sorted(listed) == sorted(path.name for path in folder.glob("0*.md"))
