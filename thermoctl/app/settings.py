@@ -18,7 +18,6 @@ from thermoctl.app.cascades import as_blocks, cascade_errors
 from thermoctl.app.configuration.document import (
     BadConfiguration,
     Document,
-    KeyPath,
     Problem,
     read_document,
 )
@@ -28,6 +27,7 @@ from thermoctl.app.configuration.repair import (
     without_unknown_keys,
 )
 from thermoctl.app.configuration.tables import HistoryTable, LoopTable, ServiceTable, Table
+from thermoctl.app.configuration.toml_places import KeyPath
 from thermoctl.app.configuration.wording import (
     reasons,
     shown,

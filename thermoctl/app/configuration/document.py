@@ -16,10 +16,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from thermoctl.app.configuration.toml_places import line_of, places, written_at
+from thermoctl.app.configuration.toml_places import KeyPath, line_of, places, written_at
 from thermoctl.errors import ConfigError, NotPermitted
-
-KeyPath = tuple[str, ...]
 
 _HINTS = (
     (re.compile(r"=\s*[+-]?\d+,\d"), "write a decimal point, not a comma"),

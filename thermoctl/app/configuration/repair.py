@@ -11,7 +11,8 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from thermoctl.app.configuration.tables import LoopTable
-from thermoctl.app.configuration.wording import KeyPath, keys_to, validated
+from thermoctl.app.configuration.toml_places import KeyPath
+from thermoctl.app.configuration.wording import keys_to, validated
 
 LIMITS: Final[Mapping[str, float | None]] = {
     "setpoint_c": 20.0,

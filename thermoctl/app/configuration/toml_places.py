@@ -14,13 +14,13 @@ _HEADER = re.compile(rf"^\s*\[\[?\s*{_PATH}\s*\]\]?\s*(#.*)?$")
 _KEY = re.compile(rf"^\s*{_PATH}\s*=")
 _LONG_STRING = re.compile(r"\"\"\"|'''")
 
-Path = tuple[str, ...]
+KeyPath = tuple[str, ...]
 
 
-def places(text: str) -> dict[Path, int]:
+def places(text: str) -> dict[KeyPath, int]:
     """Return the line number, from 1, of every table and key of `text` by its path."""
-    found: dict[Path, int] = {}
-    table: Path = ()
+    found: dict[KeyPath, int] = {}
+    table: KeyPath = ()
     closing = ""  # the quotes that end a string over several lines, while inside one
     for number, line in enumerate(text.splitlines(), 1):
         inside = closing
@@ -36,7 +36,7 @@ def places(text: str) -> dict[Path, int]:
     return found
 
 
-def line_of(found: dict[Path, int], path: Path) -> int | None:
+def line_of(found: dict[KeyPath, int], path: KeyPath) -> int | None:
     """Return the line of `path`, or of the nearest table written around it."""
     while path:
         if (line := written_at(found, path)) is not None:
@@ -45,12 +45,12 @@ def line_of(found: dict[Path, int], path: Path) -> int | None:
     return None
 
 
-def written_at(found: dict[Path, int], path: Path) -> int | None:
+def written_at(found: dict[KeyPath, int], path: KeyPath) -> int | None:
     """Return the line of `path`, or of the first below it: `[a.b]` makes an `a`."""
     if path in found:
         return found[path]
     return min((line for key, line in found.items() if key[: len(path)] == path), default=None)
 
 
-def _split(path: str) -> Path:
+def _split(path: str) -> KeyPath:
     return tuple(part.strip("\"'") for part in re.findall(_PART, path))

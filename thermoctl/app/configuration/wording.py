@@ -10,11 +10,11 @@ from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from thermoctl.app.configuration.toml_places import KeyPath
 from thermoctl.app.configuration.units import other_unit
 from thermoctl.app.plugins import blamed, nearest
 from thermoctl.quantities import is_finite_number
 
-KeyPath = tuple[str, ...]
 Model = TypeVar("Model", bound=BaseModel)
 
 _LONGEST = 60
