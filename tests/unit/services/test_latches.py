@@ -144,6 +144,14 @@ def test_the_thread_stores_at_once_and_before_it_closes(store, acks):
     assert store.load("tank").code == ALARM.code
 
 
+def test_a_keeper_that_could_not_write_does_not_close_as_if_it_had(store, state, acks):
+    state.write_text("in the way")
+    keeper = LatchKeeper(store, acks.append, poll_s=3600.0)
+    keeper.start()
+    keeper.latched("tank", ALARM)
+    assert not keeper.close(timeout_s=30.0)
+
+
 def test_the_thread_hands_a_deletion_on(store):
     asked = threading.Event()
     keeper = LatchKeeper(store, lambda loop: asked.set(), poll_s=0.001)

@@ -50,6 +50,14 @@ def test_a_killed_holder_keeps_nobody_out(tmp_path, holder):
         assert (tmp_path / "daemon.lock").read_text() == f"{os.getpid()}\n"
 
 
+def test_a_lock_is_let_go_at_the_end_of_its_block_whatever_ends_it(tmp_path):
+    lock = DaemonLock(tmp_path / "x.lock")
+    with pytest.raises(ZeroDivisionError), lock:
+        1 / 0
+    with DaemonLock(tmp_path / "x.lock"):
+        pass
+
+
 def test_a_released_lock_is_free(tmp_path):
     first, second = DaemonLock(tmp_path / "x.lock"), DaemonLock(tmp_path / "x.lock")
     first.acquire()

@@ -42,6 +42,14 @@ def test_a_latch_comes_back_as_it_was_saved(tmp_path, wall_clock):
     assert store.load("mash") is None
 
 
+def test_what_could_not_be_put_in_place_is_told_and_leaves_no_litter(tmp_path, wall_clock):
+    store = StateStore(tmp_path, wall_clock)
+    store.path_of("run-tank").mkdir()
+    with pytest.raises(OSError, match="run-tank"):
+        store.write("run-tank", {})
+    assert [each.name for each in tmp_path.iterdir()] == ["run-tank.json"]
+
+
 def test_a_cleared_latch_is_gone_and_clearing_twice_is_fine(tmp_path, wall_clock):
     store = LatchStore(tmp_path, tmp_path / "run", wall_clock)
     store.save("tank", LATCH)
