@@ -28,3 +28,14 @@ def test_the_line_that_puts_the_law_of_the_paper_in_the_shadow_does_so():
     least["loops"]["tank"] |= tomllib.loads(example)["loops"]["tank"]
     shadow = plan_for(load(least).loops["tank"]).shadow
     assert (shadow.name, shadow.reference_time_s) == ("self-tuning-mv", 60.0)
+
+
+def test_the_walk_of_a_sample_has_the_numbers_that_stand_beside_its_code():
+    page = (TOP / "docs" / "architecture.md").read_text(encoding="utf-8")
+    steps = re.findall(r"^(\d+)\. \*\*(.+?)\.\*\*", page, re.MULTILINE)
+    noted = {}
+    for name in ("runtime/loop.py", "regulator/regulator.py"):
+        source = (TOP / "thermoctl" / name).read_text(encoding="utf-8")
+        noted |= dict(re.findall(r"  # (\d+)\. (.+)$", source, re.MULTILINE))
+    assert [(n, noted.get(n)) for n, _ in steps] == [(n, title.lower()) for n, title in steps]
+    assert len(noted) == len(steps)

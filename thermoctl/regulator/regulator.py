@@ -200,29 +200,29 @@ class Regulator:
         load = self._load.mean(t_s, interval_s)
         taken, command = self._applied_power(), self._commanded_power()
         applied, commanded = taken - load, command - load
-        verdict = self._supervisor.judge(measurement, t_s, interval_s, self._jump_k)
+        verdict = self._supervisor.judge(measurement, t_s, interval_s, self._jump_k)  # 5. judge
         temperature_c = float(measurement.temperature_c) if verdict is Verdict.GOOD else math.nan
-        self._learning.observe(temperature_c, self._given(applied, interval_s), t_s)
+        self._learning.observe(temperature_c, self._given(applied, interval_s), t_s)  # 6. identify
         if self._watch is not None:
-            self._watch.observe(t_s, interval_s, temperature_c, applied)
+            self._watch.observe(t_s, interval_s, temperature_c, applied)  # 7. check the heater
         seen_s = self._supervisor.seen_s
         self._learning.hold(temperature_c - self._wishes.setpoint_c, applied, seen_s)
         reference = self._wishes.approach(temperature_c, seen_s, self._supervisor.state)
         situation = self._learning.situation(
             t_s, interval_s, temperature_c, reference, applied, commanded
         )
-        self._steering.observe(situation)
+        self._steering.observe(situation)  # 8. observe
         self._shadow.observe(situation, self._steering.mind)
         pole, holding_power = self._learning.pole(t_s), self._learning.holding_power
         self._beliefs = beliefs = self._steering.beliefs(situation, pole, holding_power)
         weighed = attempt(self._weigh, interval_s, applied, taken - command, temperature_c)
-        if isinstance(weighed, Failure):
+        if isinstance(weighed, Failure):  # 9. forecast
             self._feasibility.fail(weighed)
         ride_s = self._ride_s(situation, beliefs) if verdict is Verdict.MISSING else 0.0
-        state = self._supervisor.rule(t_s, ride_s)
-        asked, reason = self._ask(situation, state, beliefs)
+        state = self._supervisor.rule(t_s, ride_s)  # 10. rule
+        asked, reason = self._ask(situation, state, beliefs)  # 11. decide
         self._steering.tell_remarks(t_s)
-        self._command = self._supervisor.bound(asked, reason, t_s)
+        self._command = self._supervisor.bound(asked, reason, t_s)  # 12. bound
         steered = self._wishes.mode is Mode.AUTO and state is State.RUN
         load = self._load.at(t_s)
         self._shadow.decide(situation, self._command.power - load, seen_s, steered=steered)

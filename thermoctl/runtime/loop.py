@@ -1,7 +1,8 @@
 """The loop: wakes at absolute deadlines and walks one sample through the house.
 
-Start reading at `Loop._walk`; everything around it is about what to do when something fails, and
-the answer is always: power 0, said loudly, and on with the next cycle.
+Start reading at `Loop._walk`; the numbers beside it are those of the walk in
+``docs/architecture.md``. Everything around it is about what to do when something fails, and the
+answer is always: power 0, said loudly, and on with the next cycle.
 """
 
 from __future__ import annotations
@@ -124,7 +125,7 @@ class Loop:
         """
         deadline_s = self._clock.now_s()
         while not self.stopping and deadline_s <= until_s:
-            self._clock.sleep_until(deadline_s)
+            self._clock.sleep_until(deadline_s)  # 1. wake
             if not self.stopping:
                 self.cycle(deadline_s)
             deadline_s += self._period_s
@@ -148,7 +149,7 @@ class Loop:
         if self._sound:
             self.cycles += 1
             self._failure = ""
-            self._call_isolated(self._completed)
+            self._call_isolated(self._completed)  # 15. alive
 
     def shut_down(self) -> bool:
         """Write power 0 to every board, let them go; return whether all must be off."""
@@ -165,24 +166,24 @@ class Loop:
         if late_s > SUSPENDED_S:
             self._all_off()
             self.report("cycle.late", late_s=late_s)
-        self._requests.grant()
+        self._requests.grant()  # 2. requests
         samples, seen = {}, {}  # filled in loops: a comprehension takes twice as long
         for board in self.boards:
-            samples[id(board)] = self._read(board)
+            samples[id(board)] = self._read(board)  # 3. read
         if self._boards_awaited():
             return  # no reading is missing yet, and no output is on
         for wiring in self.wirings:
-            seen[wiring.name] = self._measure(wiring, samples)
-        led = self._cascade.tell(seen)
+            seen[wiring.name] = self._measure(wiring, samples)  # 4. measure
+        leading = self._cascade.tell(seen)
         walked, steps = [], {}
         for wiring in self.wirings:
             begin_ns = time.thread_time_ns()
-            steps[wiring.name] = step = wiring.regulator.step(seen[wiring.name])
+            steps[wiring.name] = step = wiring.regulator.step(seen[wiring.name])  # 5 to 12
             walked.append((wiring, step, (time.thread_time_ns() - begin_ns) / 1000.0))
             hand_down(wiring, step.command.power, self._named)
-        self._cascade.gave = accepted = self._write(steps, led)
+        self._cascade.gave = accepted = self._write(steps, leading)  # 13. write
         events = self.take_events()
-        for wiring, step, tick_us in walked:
+        for wiring, step, tick_us in walked:  # 14. publish
             taken = accepted[wiring.name]
             self._call_isolated(self._publish_cycle, wiring, step, events, taken, tick_us, late_s)
 
@@ -244,8 +245,8 @@ class Loop:
             measurement, t_s=now_s, quality=Quality.STALE if old else measurement.quality
         )
 
-    def _write(self, steps: Mapping[str, Step], led: Mapping[str, float]) -> dict[str, float]:
-        """Give every board its drives; return the accepted power by loop, with what is `led`."""
+    def _write(self, steps: Mapping[str, Step], leading: Mapping[str, float]) -> dict[str, float]:
+        """Give every board its drives; return the accepted power by loop, `leading` ones too."""
         taken: dict[Output, float] = {}
         for board in self.boards:
             wired = self._outputs[id(board)]
@@ -271,7 +272,7 @@ class Loop:
                 self._fail(self._dependents(board), "cycle.failed", error)
             else:
                 taken.update(powers)
-        accepted = dict(led)
+        accepted = dict(leading)
         for wiring in self.wirings:
             if wiring.outputs:
                 accepted[wiring.name] = self._accepted(wiring, taken)
