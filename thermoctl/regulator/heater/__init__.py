@@ -11,6 +11,6 @@ the reading does. `check` has its settings; `led` watches a block that another l
   temperature that a plant does not pass. `trial` gives an unknown heater its time to show a rise.
 - `cut` is a question that is being put, `question` the regression that reads the answer, `evidence`
   weighs loads against faults, `fall` knows a fall that no heater makes, and `hearing` says when an
-  answer is believed.
+  answer is believed. What a bad one leads to is in `verdicts`.
 - `memory` keeps what is known between runs.
 """

@@ -23,6 +23,7 @@ from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S, CREPT_LAG
 from thermoctl.regulator.heater.response import Gain, HeatResponse, Seen
 from thermoctl.regulator.heater.stuck_sensor import StuckSensor
 from thermoctl.regulator.heater.trial import Trial
+from thermoctl.regulator.heater.verdicts import Verdicts
 from thermoctl.regulator.supervisor import Emit
 
 OFF = 0.01
@@ -30,12 +31,8 @@ OFF = 0.01
 RISES = 0.3
 """If, at power 0, the reading rises at more than this share of the full-power rate, the heater is
 stuck on."""
-LATELY_S = 1800.0
-"""Time in s after a verdict within which a second one latches."""
 ROWS = 450
 """Number of blocks that are remembered: half an hour at a period of 1 s."""
-
-_FAULTS = {"heater.no_response": 23, "heater.reversed": 3, "heater.stuck_on": 24}
 
 
 class HeaterWatch:
@@ -66,7 +63,8 @@ class HeaterWatch:
         self._rows: deque[Seen] = deque(maxlen=ROWS)
         self._cut: Cut | None = None
         self._t_s = self._off_s = 0.0
-        self._failed_s = self._refused_c = -math.inf  # the latter: readings above it teach again
+        self._verdicts = Verdicts(supervisor)
+        self._refused_c = -math.inf  # readings above it teach again
         self._distrusted_k = 0.0  # heat that must be answered before anything is learnt again
 
     @property
@@ -181,7 +179,8 @@ class HeaterWatch:
         if self._cut is not None or self._distrusted_k > 0.0:
             self._emit("heater.answered", text=ceiling.TEXT.format(self.ceiling_c))
         self._trial.begin(self._t_s)
-        self._failed_s, self._distrusted_k = -math.inf, 0.0
+        self._verdicts.take_back()
+        self._distrusted_k = 0.0
         self._trust()
 
     def _disown(self, now: Seen) -> None:
@@ -295,7 +294,7 @@ class HeaterWatch:
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
         elif known is None and asked_s > self._trial.listens_s(block.sd_k):
             if self._trial.exhausted and not shown.mean > question.LIKELY * shown.sd:
-                self._failed_s = self._t_s  # asked often enough: nothing is left to be tried
+                self._verdicts.note(self._t_s)  # asked often enough: nothing is left to be tried
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
                 return
             self._trial.enlarge(block.sd_k)
@@ -358,8 +357,8 @@ class HeaterWatch:
         if self._heater.recalled and shown.mean > question.SURE * shown.sd:
             self._accept(shown, asked_s)
             return
-        if self._heater.gain is None and self._t_s - self._failed_s >= LATELY_S:
-            self._failed_s = self._t_s
+        if self._heater.gain is None and not self._verdicts.lately(self._t_s):
+            self._verdicts.note(self._t_s)
             asked_c = [row.reading_c for row in self._rows if row.t_s >= cut.from_s]
             self._refused_c = max(asked_c) + trial.RISE_K  # one that falls bends like a lag
             self._trial.insist(self._t_s)
@@ -372,17 +371,14 @@ class HeaterWatch:
 
     def _fail(self, code: str, text: str, t_s: float) -> None:
         """Go to SAFE; to LATCHED at the second time, or where nothing can switch it off."""
-        fault = _FAULTS[code]
-        self._supervisor.fail(code, fault, text, t_s)
-        if code == "heater.stuck_on" or self._t_s - self._failed_s < LATELY_S:
-            self._supervisor.latch(code, fault, text, t_s)
-            if self._heater.recalled:  # once it is mended, or acknowledged, it is a new one
-                self._heater.forget()
+        latched = self._verdicts.fail(code, text, t_s, self._t_s)
+        if latched and self._heater.recalled:  # once mended, or acknowledged, it is a new one
+            self._heater.forget()
         self._suspect(self._heater.gain)
 
     def _suspect(self, known: Gain | None) -> None:
         """Go on with a heater that has to answer to its next heat, and soon: or it is latched."""
-        self._failed_s = self._t_s
+        self._verdicts.note(self._t_s)
         self._trial.insist(self._t_s)
         if known is not None:
             self._distrusted_k = 2.0 * known.stored_k
