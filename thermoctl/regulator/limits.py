@@ -78,7 +78,9 @@ class Limits:
     OPEN_WINDOW_S = 600.0
     """Time in s within which OPEN_COUNT open circuits latch."""
     STEEPEST_K_PER_S = 0.5
-    """Largest gain in K/s that widens the jump: 1,500 W in 0.7 l of water."""
+    """Largest gain in K/s that widens the jump while it is a guess: 1,500 W in 0.7 l of water."""
+    KNOWN_SHARE = 0.5
+    """A gain with two standard deviations of at most this share of it is no guess any more."""
     WIDEST_K = 10.0
     """Largest jump in K, whatever gain and period: half of a plain spike."""
     OUTLIERS = 2
@@ -146,14 +148,17 @@ class Limits:
 
         That is twice its rise in a period at full power, as long as the gain is two standard
         deviations above its mean. A plant never seen before is thus given its way, while one that
-        is known narrows the jump again.
+        is known narrows the jump again. Only a gain that is known may be steeper than that of
+        any water: a guess would call the rise of a dry element a plant.
 
         Parameters
         ----------
         gain, gain_sd : float
             Rise at full power and its standard deviation, in K/s; NaN where nothing is believed.
         """
-        largest = min(abs(gain) + 2.0 * gain_sd, self.STEEPEST_K_PER_S)
+        size, error = abs(gain), 2.0 * gain_sd
+        known = 0.0 < error <= self.KNOWN_SHARE * size  # an error of 0: none was told
+        largest = size + error if known else min(size + error, self.STEEPEST_K_PER_S)
         explained_k = min(2.0 * largest * self.period_s, self.WIDEST_K)
         return explained_k if self.jump_widens and explained_k > self.jump_k else self.jump_k
 

@@ -52,6 +52,7 @@ from thermoctl.signals import (
 )
 
 _NAN_IN_A_ROW = 3
+_BLIND = (Verdict.MISSING, Verdict.SPIKE)
 _EARLIER_TEXT = "latched before this start: {}"
 
 
@@ -218,7 +219,7 @@ class Regulator:
         weighed = attempt(self._weigh, interval_s, applied, taken - command, temperature_c)
         if isinstance(weighed, Failure):  # 9. forecast
             self._feasibility.fail(weighed)
-        ride_s = self._ride_s(situation, beliefs) if verdict is Verdict.MISSING else 0.0
+        ride_s = self._ride_s(situation, beliefs) if verdict in _BLIND else 0.0
         state = self._supervisor.rule(t_s, ride_s)  # 10. rule
         asked, reason = self._ask(situation, state, beliefs)  # 11. decide
         self._steering.tell_remarks(t_s)

@@ -136,7 +136,8 @@ class Supervisor:
         elif verdict in _CIRCUITS:
             self._circuit(verdict, t_s)
         else:
-            self._blind(t_s, ride_s if verdict is Verdict.MISSING else 0.0)
+            rides = verdict is Verdict.MISSING or self.state is State.RIDE  # no spike ends a ride
+            self._blind(t_s, ride_s if rides else 0.0)
         return self.state
 
     def _trip(self, verdict: Verdict, t_s: float) -> None:
@@ -193,10 +194,8 @@ class Supervisor:
         missing = self.verdict is Verdict.MISSING
         patience_s = limits.hold_s if missing else limits.unsteady_s
         rides, holds = blind_s < min(ride_s, limits.RIDE_S), blind_s < patience_s
-        if not (rides or holds) or (missing and blind_s >= limits.RIDE_ALARM_S):
-            what = "reading" if missing else "believable reading"
-            text = f"expected a {what} every {limits.period_s:g} s, none for {blind_s:.0f} s"
-            self._raise("sensor.missing", 16, text, t_s, priority=1 if not rides else 2)
+        if not (rides or holds) or ((missing or rides) and blind_s >= limits.RIDE_ALARM_S):
+            self._raise("sensor.missing", 16, self._unseen(), t_s, priority=1 if not rides else 2)
         if self.state in (State.SAFE, State.LATCHED):
             return
         self._forsaken, self._good_s = missing, 0.0
@@ -204,6 +203,14 @@ class Supervisor:
             State.RIDE if rides else State.HOLD if holds else State.SAFE,
             f"sensor.{self.verdict.value}",
         )
+
+    def _unseen(self) -> str:
+        """Return in words for how long nothing was to be believed, and why it was not."""
+        every, none = f"every {self.limits.period_s:g} s", f"none for {self._blind_s:.0f} s"
+        off_k = abs(self._judged.suspect_c - self._judged.last_good_c)
+        if self.verdict is Verdict.MISSING or not math.isfinite(off_k):
+            return f"expected a reading {every}, {none}"
+        return f"expected a believable reading {every}, {none}: the last is {off_k:.1f} K off"
 
     def fail(
         self, code: str, fault: int | None, text: str, t_s: float, trace: str | None = None

@@ -34,6 +34,20 @@ def test_at_a_sample_a_second_no_belief_widens_the_usual_jump():
     assert Limits(60.0, 0.0, 5.0, 55.0).jump_for(0.5, 10.0) == 1.0
 
 
+@pytest.mark.parametrize(
+    ("gain", "gain_sd", "jump_k"),
+    [
+        (3.5, 0.1, 7.4),  # a hot end, known
+        (3.5, 1.0, 1.0),  # guessed: a dry element rises as fast
+        (3.5, 0.0, 1.0),  # nobody says how well it is known
+        (8.0, 0.1, 10.0),
+    ],
+)
+def test_only_a_gain_that_is_known_may_be_steeper_than_that_of_any_water(gain, gain_sd, jump_k):
+    limits = Limits(300.0, 0.0, 5.0, 290.0)
+    assert limits.jump_for(gain, gain_sd) == pytest.approx(jump_k)
+
+
 def test_no_period_is_so_long_that_a_spike_of_20_k_is_believed():
     assert Limits(60.0, 0.0, 5.0, 55.0, period_s=3600.0).jump_for(0.5, 10.0) <= 10.0
 

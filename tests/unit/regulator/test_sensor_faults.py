@@ -69,6 +69,33 @@ def test_a_ride_alarms_after_five_seconds_and_ends_safe_within_a_minute(warm):
     assert warm.steps[-1].state is State.SAFE
 
 
+def test_an_outlier_does_not_end_a_ride_and_does_not_begin_one(warm):
+    ridden = [warm.step(Quality.MISSING) for _ in range(5)] + [warm.step(offset_k=12.0)]
+    ridden += [warm.step(Quality.MISSING) for _ in range(4)]
+    assert {step.state for step in ridden} == {State.RIDE}
+    assert all(0.0 < step.command.power <= step.beliefs.holding_power for step in ridden)
+    warm.run(60)
+    assert warm.step(offset_k=12.0).state is State.HOLD
+
+
+def test_a_ride_that_only_outliers_interrupt_ends_as_any_other(warm):
+    steps = []
+    for offset_k in (8.0, -8.0) * 15:
+        steps += [warm.step(Quality.MISSING), warm.step(offset_k=offset_k)]
+    off = [step.command.power for step in steps].index(0.0)
+    print(f"sensor missing or spiky, model known: power 0 after {off} s")
+    assert off <= 60
+    assert steps[-1].state is State.SAFE
+
+
+def test_who_believes_no_reading_says_how_far_off_the_last_one_was(warm):
+    steps = [warm.step(offset_k=offset_k) for offset_k in (20.0, -20.0, 20.0, -20.0)]
+    (alarm,) = steps[-1].alarms
+    assert steps[-1].state is State.SAFE
+    assert alarm.text.startswith("expected a believable reading every 1 s, none for 3 s: the last")
+    assert alarm.text.endswith("20.0 K off")
+
+
 def test_an_alarm_that_was_a_warning_when_it_was_acknowledged_rings_anew_when_it_costs_the_heat(
     warm,
 ):
