@@ -89,6 +89,12 @@ def test_steinhart_and_hart_give_ten_kilohm_at_25_degrees_for_the_common_thermis
     assert curve.temperature_c(10_000.0) == pytest.approx(25.0, abs=0.01)
 
 
+@pytest.mark.parametrize("temperature_c", [-273.15, -300.0, math.nan])
+def test_no_thermistor_has_a_resistance_at_or_below_absolute_zero(temperature_c):
+    assert math.isnan(CURVES["Steinhart"].ohm(temperature_c))
+    assert math.isnan(CURVES["Beta"].ohm(temperature_c))
+
+
 def test_the_lm335_at_the_set_point_of_the_rig_reads_636_counts_of_1024():
     sensor = Sensor(LM335, reference_v=5.0)
     assert LM335.volts(37.5) == pytest.approx(3.1065)
@@ -107,6 +113,11 @@ def test_one_point_calibration_of_an_lm335_corrects_every_temperature(gain, poin
     sensor = Sensor(LM335, reference_v=5.0, calibration=calibration)
     wrong_v = LM335.volts(any_c) * gain
     assert sensor.temperature_c(wrong_v / 5.0) == pytest.approx(any_c, abs=1e-9)
+
+
+def test_the_largest_corrections_are_still_taken():
+    for gain, offset_k in ((0.8, -20.0), (1.25, 20.0)):
+        assert Calibration(gain, offset_k).gain == gain
 
 
 def test_calibration_by_offset_shifts_the_reading():
@@ -184,7 +195,9 @@ def test_no_sample_whatsoever_makes_a_sensor_raise_or_call_nonsense_good(name, c
         (lambda: Steinhart(math.nan, 1e-4, 1e-7), "a must"),
         (lambda: Beta(beta_k=-1.0), "beta_k"),
         (lambda: PullUp(Platinum(), 0.0, 5.0), "pull_up_ohm"),
-        (lambda: Calibration(gain=2.0), "gain"),
+        (lambda: Calibration(gain=0.79), "gain"),
+        (lambda: Calibration(gain=1.26), "gain"),
+        (lambda: Calibration(offset_k=-20.1), "offset_k"),
         (lambda: Calibration(offset_k=math.nan), "offset_k"),
         (lambda: Calibration.by_gain(LM335, 0.0, 25.0), "volts"),
     ],
