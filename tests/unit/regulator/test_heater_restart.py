@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from thermoctl.regulator.heater import memory as heater_memory
+from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.check import HeaterCheck
 from thermoctl.regulator.heater.known import OFF_LAGS, KnownHeater
 from thermoctl.regulator.heater.past import FirstReadings
@@ -245,11 +246,11 @@ def test_a_memory_that_makes_no_sense_is_refused_by_its_name(name, value):
         heater_memory.recall(model | {name: value})
 
 
-def seen(readings_c, sd_k=0.01, powers=None):
+def seen(readings_c, sd_k=0.01, powers=None, span_s=4.0):
     first = FirstReadings()
     for n, reading_c in enumerate(readings_c):
         power = 1.0 if powers is None else powers[n]
-        first.observe(power, reading_c, sd_k)
+        first.observe(Block(span_s, power, reading_c, sd_k))
     return first
 
 
@@ -265,6 +266,14 @@ def test_a_start_from_cold_bends(lag_s):
     at_s = [4.0 * n + 2.0 for n in range(70)]
     rises_k = [0.05 * (t - lag_s + math.exp(-t / pole_s) * (t + lag_s)) for t in at_s]
     assert math.isnan(seen([20.0 + rise_k for rise_k in rises_k]).power)
+
+
+def test_in_long_blocks_a_power_that_is_taken_back_bends_the_reading():
+    powers, readings_c = [0.0, 1.0, 0.6, 0.3, 0.2, 0.15], [22.8, 24.6, 27.8, 30.0, 31.1, 31.7]
+    assert seen(readings_c, powers=powers).power == 1.0
+    cold = seen(readings_c, powers=powers, span_s=10.0)
+    assert cold.told
+    assert math.isnan(cold.power)
 
 
 def test_a_reading_at_rest_or_falling_says_nothing_of_heat():

@@ -10,7 +10,8 @@ the reading does. `check` has its settings; `led` watches a block that another l
 - `doubt` holds readings against that model, `climb` against the last rise, `ceiling` knows the
   temperature that a plant does not pass. `trial` gives an unknown heater its time to show a rise.
 - `cut` is a question that is being put, `question` the regression that reads the answer, `evidence`
-  weighs loads against faults, `fall` knows a fall that no heater makes, and `hearing` says when an
-  answer is believed. What a bad one leads to is in `verdicts`.
+  weighs loads against faults, `balance` knows what a plant loses under one, `fall` a fall that no
+  heater makes, and `hearing` says when an answer is believed. What a bad one leads to is in
+  `verdicts`.
 - `memory` keeps what is known between runs.
 """

@@ -14,8 +14,10 @@ no more in a block than a heater could do, so that a litre of cold water is soon
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from thermoctl.quantities import clamp
+from thermoctl.regulator.heater.balance import balance
 from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Heat, Seen
 
@@ -113,10 +115,34 @@ class HeatDoubt:
         self.since = self._begin = None
         self._jumped = False
 
-    def trust(self) -> None:
-        """Take the loss for what it is now: the heater was asked, and answers."""
+    def trust(
+        self,
+        gain: Gain | None = None,
+        rows: Iterable[Seen] = (),
+        since_s: float | None = None,
+    ) -> None:
+        """Take the power for what holds the plant: the heater was asked, and answers.
+
+        Where heat was missing since `since_s`, and for the second time of late, so is the loss. By
+        one answer it is not, for that of a sensor in the air may look like a good one.
+        """
+        if gain is not None and since_s is not None and self._answered_s > 0.0:
+            self._lose(gain, rows, since_s)
         self.stand_by()
         self._answered_s = ANSWERED_S
+
+    def acquit(self, gain: Gain, rows: Iterable[Seen], since_s: float) -> None:
+        """Take the loss for what it is since `since_s`: the heater has answered unasked."""
+        self._lose(gain, rows, since_s)
+        self.stand_by()
+        self.clear()
+
+    def _lose(self, gain: Gain, rows: Iterable[Seen], since_s: float) -> None:
+        """Take the loss for what it was seen to be since `since_s`, if it has grown."""
+        seen = balance(rows, since_s, gain)
+        if seen is not None and seen.loss > self.loss(gain):
+            self._rates, self._level_c = seen.rates, seen.level_c
+            self._rise_rate = gain.mean * seen.rates[gain.place] - seen.loss
 
     def stand_by(self) -> None:
         """Take the power that is needed now for what holds the reading."""
@@ -153,6 +179,10 @@ class HeatDoubt:
     def cold(self, gain: Gain, sd_k: float, *, again: bool = False) -> bool:
         """Return whether the reading fails to answer; sooner `again`, after a bad answer."""
         return self.crept or self.short(gain, sd_k, again=again)
+
+    def creeps(self, gain: Gain, sd_k: float, *, again: bool) -> bool:
+        """Return whether nothing is in doubt but why the power has grown."""
+        return self.crept and not self.short(gain, sd_k, again=again)
 
     def short(self, gain: Gain, sd_k: float, *, again: bool) -> bool:
         """Return whether the reading has not risen as the heat should have made it."""

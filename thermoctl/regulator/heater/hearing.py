@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from thermoctl.regulator.heater import evidence, question
+from thermoctl.regulator.heater.balance import brought_back
 from thermoctl.regulator.heater.cut import Cut
+from thermoctl.regulator.heater.known import OFF_LAGS
 from thermoctl.regulator.heater.question import Answer
 from thermoctl.regulator.heater.response import Gain, Seen
 
@@ -57,3 +59,16 @@ def answer(
     odds = evidence.odds(rows, cut.began_s, known, sd_k, late=found is Answer.LATE)
     weighed = evidence.weigh(found, odds, crept=cut.crept, late=late)
     return weighed, known if odds > evidence.SOUND or found is Answer.LATE else shown
+
+
+def unasked(rows: Collection[Seen], since_s: float, known: Gain, sd_k: float) -> bool:
+    """Return whether more power brought a reading back that fell at `since_s`."""
+    from_s = since_s - evidence.BEFORE_LAGS * known.lag_s
+    back = brought_back(rows, from_s, sd_k)
+    return back and evidence.odds(rows, from_s, known, sd_k) > evidence.SOUND
+
+
+def rising(rows: Collection[Seen], known: Gain, now: Seen, off_s: float, sd_k: float) -> float:
+    """Return how fast the reading has surely risen without power, in K/s."""
+    from_s = now.t_s - min(max(OFF_LAGS * known.lag_s, question.BEFORE_S), off_s)
+    return question.slope(rows, from_s, less_sd_k=sd_k)

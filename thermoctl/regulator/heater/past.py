@@ -16,6 +16,8 @@ import math
 from collections import deque
 from enum import Enum
 
+from thermoctl.regulator.heater.blocks import Block
+
 LEAST = 5
 """Least number of blocks before anything is said."""
 CLEAR_SDS = 10.0
@@ -28,6 +30,9 @@ MOVES = 0.05
 BEGINS = 15
 """Number of blocks that a rise may take to be clear, whatever the power does: a law that sees
 earlier heat brakes at once."""
+SOON_S = 6.0
+"""Longest block in s of which that is true. A reading that has bent after five longer ones may have
+done so because the power has moved, as it does in any warm-up of a small plant."""
 LONGEST = 75
 """Number of blocks without a clear rise after which it makes no difference."""
 
@@ -64,8 +69,9 @@ class FirstReadings:
         """How far the reading has risen in each of the last few blocks, in K."""
         return (self._readings_c[-1] - self._readings_c[-LEAST]) / (LEAST - 1)
 
-    def observe(self, power: float, reading_c: float, sd_k: float) -> None:
+    def observe(self, block: Block) -> None:
         """Take in one more block; a reading bends with a power that has moved."""
+        span_s, power, reading_c, sd_k = block
         if self._past is Past.NOTHING or math.isnan(reading_c):
             return
         readings_c = self._readings_c
@@ -73,7 +79,8 @@ class FirstReadings:
         n, k = len(readings_c), len(readings_c) // LEAST
         if n == 2:
             self._power = power  # the first block began before the first command
-        if self._past is Past.OPEN and n > BEGINS and abs(power - self._power) > MOVES:
+        soon = n <= BEGINS and span_s <= SOON_S
+        if self._past is Past.OPEN and not soon and abs(power - self._power) > MOVES:
             self._past = Past.NOTHING
         if self._past is Past.HEAT or n < LEAST:
             return

@@ -43,8 +43,9 @@ MEMORY_S = 1500.0
 """Time constant in s of the regression, counted while power moves."""
 MEAN_S = 50.0
 """Time constant in s of the mean power, from which a move is told."""
-ALIKE = 4.0
-"""Factor on all errors: the remainder of one block resembles the next."""
+ALIKE, ALIKE_S = 4.0, 6.0
+"""Factor on all errors: the remainder of one block resembles the next. Of blocks that are longer
+than ALIKE_S in s, fewer do, and it falls with the root of the length."""
 BLOCKS_LEAST = 4.0
 COOLS_SURE = 3.0
 """Standard deviations beyond which a loss that grows with the reading counts."""
@@ -168,7 +169,7 @@ class HeatResponse:
         self._paths = [_Path(lag_s) for lag_s in LAGS_S + BETWEEN_S]
         self._total = _Total()
         self._span_s = math.nan
-        self._fade = 1.0
+        self._fade, self._alike = 1.0, ALIKE
         self._mean_power, self._moving_s = 0.0, 0.0
         self._squares = self._blocks = self._variance = 0.0
         self.gain: Gain | None = None
@@ -191,7 +192,7 @@ class HeatResponse:
         if learn and abs(block.power - self._start.power) > MOVES:
             self._learn_anew()
         self._arrive(span_s, block.power)
-        self._start.observe(block.power, reading_c, block.sd_k)
+        self._start.observe(block)
         self._mixes_s -= span_s
         if math.isnan(self._last_c):
             self._line_c = self._last_c = reading_c
@@ -252,6 +253,7 @@ class HeatResponse:
         """Let `span_s` of `power` go through every lag."""
         if span_s != self._span_s:
             self._span_s, self._fade = span_s, math.exp(-span_s / TREND_S)
+            self._alike = max(ALIKE * math.sqrt(ALIKE_S / max(span_s, ALIKE_S)), 1.0)
             for path in self._paths:
                 path.step = -math.expm1(-span_s / path.pole_s)
         for path in self._paths:
@@ -291,8 +293,8 @@ class HeatResponse:
 
         How fast it cools is a ridge regression: about nothing, unless the readings know better.
         """
-        paths, total, least = self._paths, self._total, block.sd_k**2
-        own = total.squares + (ALIKE * COOLS_S) ** 2 * max(self._variance, least)
+        paths, total, least, alike = self._paths, self._total, block.sd_k**2, self._alike
+        own = total.squares + (alike * COOLS_S) ** 2 * max(self._variance, least)
         products, plain, cooling = total.products, [], []
         for path in paths:
             squares, along = path.squares, path.along
@@ -311,15 +313,15 @@ class HeatResponse:
         self._variance = variance = max((self._squares - most) / self._blocks, least)
         across = best.squares * own - best.along * best.along
         cools_per_s = (best.along * best.products - best.squares * products) / across
-        if cools_per_s > COOLS_SURE * ALIKE * math.sqrt(variance * best.squares / across):
+        if cools_per_s > COOLS_SURE * alike * math.sqrt(variance * best.squares / across):
             cools_per_s = min(cools_per_s, COOLS_MOST)
             mean = (best.products + cools_per_s * best.along) / best.squares
-            sd = ALIKE * math.sqrt(variance * own / across)
+            sd = alike * math.sqrt(variance * own / across)
             return Gain(mean, sd, _place(cooling), cools_per_s)
         most = max(plain)
         best = paths[plain.index(most)]
         variance = max((self._squares - most) / self._blocks, least)
-        sd = ALIKE * math.sqrt(variance / best.squares)
+        sd = alike * math.sqrt(variance / best.squares)
         return Gain(best.products / best.squares, sd, _place(plain))
 
 

@@ -18,7 +18,7 @@ from thermoctl.regulator.heater.check import HeaterCheck, Reacts
 from thermoctl.regulator.heater.climb import Climb
 from thermoctl.regulator.heater.cut import Cut
 from thermoctl.regulator.heater.doubt import HeatDoubt
-from thermoctl.regulator.heater.known import OFF_LAGS, KnownHeater, arrived
+from thermoctl.regulator.heater.known import KnownHeater, arrived
 from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S, CREPT_LAGS, Answer
 from thermoctl.regulator.heater.response import Gain, HeatResponse, Seen
 from thermoctl.regulator.heater.stuck_sensor import StuckSensor
@@ -180,7 +180,7 @@ class HeaterWatch:
             self._emit("heater.answered", text=ceiling.TEXT.format(self.ceiling_c))
         self._trial.begin(self._t_s)
         self._verdicts.take_back()
-        self._distrusted_k = 0.0
+        self._cut, self._distrusted_k = None, 0.0  # at its ceiling a plant shows no loss
         self._trust()
 
     def _disown(self, now: Seen) -> None:
@@ -197,6 +197,8 @@ class HeaterWatch:
         if known is None and not jumped and rising.calm(block.sd_k):
             self._doubt.begin(before, now)
         if rising.stalled(block.sd_k) and block.power >= OFF:
+            if known is not None and self._acquits(known, rising, block.sd_k):
+                return
             lag_s = 0.0 if known is None else known.lag_s
             from_s = now.t_s - max(BEFORE_LAGS * lag_s, climb.STALLED_S)
             self._ask(Cut(now.t_s, from_s, rising.told(now)))
@@ -223,10 +225,10 @@ class HeaterWatch:
             self._distrusted_k -= known.mean * heat_s
         hot = doubt.hot(known, sd_k) and self._heater.seen  # less water is no fault
         if hot and self._off_s >= self._heater.under_way_s:
-            rate = self._rising(known, now, sd_k)
+            rate = hearing.rising(self._rows, known, now, self._off_s, sd_k)
             if rate > 0.0:  # nothing is proven while too few readings show a slope
                 self._fail("heater.stuck_on", question.told_of(rate), t_s)
-        elif self._crept(known, sd_k, again=again) and not hot and block.power >= OFF:
+        elif doubt.creeps(known, sd_k, again=again) and not hot and block.power >= OFF:
             self._ask_of_creep(known, now, sd_k)
         elif hot or (doubt.cold(known, sd_k, again=True) and block.power >= OFF):
             lags = CREPT_LAGS if doubt.crept else BEFORE_LAGS
@@ -236,11 +238,18 @@ class HeaterWatch:
             lasts = wild and self._t_s - since_s >= max(BEFORE_LAGS * known.lag_s, fall.WILD_S)
             if hot or lasts or doubt.cold(known, sd_k, again=again):
                 began_s = None if hot or wild else since_s
+                if began_s is not None and not again and self._acquits(known, doubt, sd_k):
+                    return
                 self._ask(Cut(now.t_s, from_s, doubt.told(known, now), wild, began_s))
 
-    def _crept(self, known: Gain, sd_k: float, *, again: bool) -> bool:
-        """Return whether nothing is in doubt but why the power has grown."""
-        return self._doubt.crept and not self._doubt.short(known, sd_k, again=again)
+    def _acquits(self, known: Gain, why: HeatDoubt | Climb, sd_k: float) -> bool:
+        """Return whether the heater has answered unasked to `why` it is in doubt."""
+        since_s = self._t_s if why.since is None else why.since.t_s
+        answered = hearing.unasked(self._rows, since_s, known, sd_k)
+        if answered:
+            self._doubt.acquit(known, self._rows, since_s)
+            self._climb.clear()
+        return answered
 
     def _ask_of_creep(self, known: Gain, now: Seen, sd_k: float) -> None:
         """Ask why the power has grown, unless the reading dipped and was brought back by it."""
@@ -319,16 +328,11 @@ class HeaterWatch:
         """Return whether the reading has risen long after the power went, and latch that."""
         if self._off_s <= self._heater.over_s:
             return False
-        rate = self._rising(known, now, sd_k)
+        rate = hearing.rising(self._rows, known, now, self._off_s, sd_k)
         heated = rate > RISES * known.mean
         if heated:
             self._fail("heater.stuck_on", question.told_of(rate), t_s)
         return heated
-
-    def _rising(self, known: Gain, now: Seen, sd_k: float) -> float:
-        """Return how fast the reading has surely risen since the power went, lately, in K/s."""
-        from_s = now.t_s - min(max(OFF_LAGS * known.lag_s, BEFORE_S), self._off_s)
-        return question.slope(self._rows, from_s, less_sd_k=sd_k)
 
     def _accept(self, shown: Gain, asked_s: float) -> None:
         """Go on with a heater that heats, and with the gain it has shown if that is news."""
@@ -343,7 +347,9 @@ class HeaterWatch:
 
     def _trust(self) -> None:
         """Go on with a heater that heats; what made it doubtful is how the plant is now."""
-        self._doubt.trust()
+        cut = self._cut
+        since_s = None if cut is None or cut.began_s is None else min(cut.began_s, cut.from_s)
+        self._doubt.trust(self.known, self._rows, since_s)
         self._climb.clear()
         self._resume()
 
