@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from thermoctl.control.adaptive import Adaptive, filters
 from thermoctl.control.adaptive.bank import Bank
+from thermoctl.control.adaptive.evidence import NEARER, Noise
 from thermoctl.control.adaptive.filters import D, T, X
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
@@ -17,19 +18,20 @@ NOTHING, EMPTY = start(1), np.empty(0)
 
 
 class Board:
-    """Something small and quick: .4 K/s at full power, a lag of 8 s, and a room of 22 degC.
+    """Something small and quick: `gain` K/s at full power, a lag of 8 s, and a room of 22 degC.
 
     `steep` is the share of full power that makes up for a kelvin.
     """
 
-    def __init__(self, steep, seed):
+    def __init__(self, steep, seed, gain=0.4):
+        self.gain = gain
         self.steep, self.warm_c, self.sensor_c, self.heat = steep, 25.0, 25.0, 0.0
         self.rng = np.random.default_rng(seed)
 
     def reading(self, power):
         """Return what is read a second later."""
         self.heat += (1.0 - math.exp(-1.0 / 2.5)) * (power - self.heat)
-        self.warm_c += 0.4 * (self.heat - self.steep * (self.warm_c - 22.0))
+        self.warm_c += self.gain * (self.heat - self.steep * (self.warm_c - 22.0))
         self.sensor_c += (1.0 - math.exp(-1.0 / 5.5)) * (self.warm_c - self.sensor_c)
         return self.sensor_c + 0.01 * self.rng.standard_normal()
 
@@ -118,3 +120,66 @@ def test_a_loss_that_grows_otherwise_than_expected_is_learnt_all_the_same(steep)
     assert warm_up.max() < 0.1
     assert step.max() < 0.1
     assert steep == 0.0 or np.abs(step[-200:]).max() < 0.03  # nothing cools it, once it is too hot
+
+
+@pytest.mark.parametrize("loss", [0.01, -0.01, 0.0])
+def test_far_above_its_room_a_loss_and_its_error_grow_as_if_that_were_far(loss):
+    bank = Bank()
+    before, heat = block_of(bank, loss), np.ones(len(bank.hypotheses))
+    near, far = (filters.predicted(before, heat, bank.constants, 0.0, k) for k in (40.0, 200.0))
+    moved_k, growth = far[T, X] - before[T, X], far[D, X] - before[D, X]
+    assert growth / moved_k == pytest.approx(max(loss, 0.0) / 200.0)
+    scale = np.ones((4, len(moved_k)))
+    if loss > 0.0:
+        scale[D] += growth / loss
+    noise = np.zeros((4, 4))  # which is added afterwards, and is no larger for it
+    noise[D, D] = bank.constants.noise_loss * 0.04**2
+    P = scale[:, None] * (near[:, :X] - noise[:, :, None]) * scale + noise[:, :, None]
+    assert far[:, :X] == pytest.approx(P, rel=1e-12)
+
+
+def read(*readings_c):
+    """Return the noise after these readings."""
+    noise = Noise()
+    for y in readings_c:
+        noise = noise.after(y)
+    return noise
+
+
+def test_the_coldest_counts_once_three_readings_in_a_row_were_no_warmer():
+    assert read(20.0, 20.0).coldest_c == math.inf
+    assert read(-70.0, 22.0, 21.0, 20.0).coldest_c == 22.0
+    assert read(50.0, 50.0, 50.0, 3.0, 4.0, 50.0, 50.0).coldest_c == 50.0
+    assert read(50.0, 50.0, 50.0, 3.0, 4.0, 2.0, 50.0).coldest_c == 4.0
+
+
+def test_how_far_a_plant_is_above_its_room_is_not_known_before():
+    assert not read().above_k > 0.0
+    assert not read(90.0, 20.0).above_k > 0.0
+    assert read(20.0, 20.0, 20.0, 120.0).above_k == pytest.approx(100.0 * NEARER)
+
+
+def test_a_plant_that_is_cooled_as_well_may_be_colder_than_its_room():
+    block, heat = block_of(Bank(), 0.01), np.ones(len(Bank().hypotheses))
+    constants = Bank(u_min=-0.2).constants
+    for far in (0.0, 200.0):
+        after = filters.predicted(block, heat, constants, 0.0, far)
+        moved_k = after[T, X] - block[T, X]
+        assert (after[D, X] - block[D, X]) / moved_k == pytest.approx(0.01 / 40.0)
+
+
+HOT = [  # K/s at full power, which warms by so many K
+    pytest.param(4.0, 370.0, id="as a hot end"),
+    pytest.param(7.0, 700.0, id="as an iron", marks=pytest.mark.slow),
+    pytest.param(2.0, 200.0, id="half as hot", marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize(("gain", "warms_k"), HOT)
+def test_what_is_hot_and_quick_goes_down_and_up_again_without_overshoot(gain, warms_k):
+    hot, less = 22.0 + 0.5 * warms_k, 22.0 + 0.35 * warms_k
+    warm_up, *steps = led(Board(1.0 / warms_k, 1, gain), hot, less, hot, less, hot, each_s=300)
+    assert warm_up.max() < 0.005 * warms_k
+    for up, step in zip((-1.0, 1.0, -1.0, 1.0), steps, strict=True):
+        assert (up * step).max() < 0.002 * warms_k  # 1.3 % of a step; 3 to 35 % with 40 K
+        assert np.abs(step[120:]).max() < 0.002 * warms_k

@@ -8,6 +8,7 @@ import pytest
 
 from thermoctl.control.adaptive.bank import Bank
 from thermoctl.control.adaptive.coasting import power_for
+from thermoctl.control.adaptive.constants import Plants
 
 SHAPES = [(0.18, 0.31, 0.51), (0.10, 0.75, 0.15), (0.05, 0.10, 0.85), None]
 
@@ -51,7 +52,7 @@ class Filter:
     def arrives(self, t_s):
         return t_s - self.h <= 2 * self.lag_s < t_s
 
-    def predict(self, away, t_s, steady):
+    def predict(self, away, t_s, steady, above, room):
         a = 1.0 - math.exp(-self.h / self.t2_s)
         c = self.h - self.t2_s * a  # of water that warms by 1 K/s, shown at the end of h
         F = np.array([[1, 0, -self.h, self.h * self.q_mean], [a, 1 - a, -c, c * self.q_mean],
@@ -59,19 +60,20 @@ class Filter:
         b = max(self.x[3], 1e-4)
         restless = 1 + 5 * away
         noise = [(0.08 * b) ** 2, 0.003**2, (0.0008 * b * restless) ** 2, (2e-4 * b) ** 2]
-        before = self.x[0]
+        before, lost = self.x[0], self.x[2]
         self.x = F @ self.x
-        self.grow(self.x[0] - before)
+        self.grow(self.x[0] - before, max(above, room))
         if steady:
             return
         self.knew = self.P
-        self.P = F @ self.P @ F.T + self.h * np.diag(noise)
+        G = np.diag([1, 1, self.x[2] / lost if above > room and lost > 0 else 1, 1])
+        self.P = G @ F @ self.P @ F.T @ G + self.h * np.diag(noise)
         if self.arrives(t_s):
             ridge = np.array([0, 0, 1, 1]) * 0.08 * self.x[3] * self.q
             self.P = self.P + np.outer(ridge, ridge)
 
-    def grow(self, moved):
-        self.x[2] += max(self.x[2], 0.0) * math.tanh(moved / 40)  # what is warmer loses more
+    def grow(self, moved, room):
+        self.x[2] += max(self.x[2], 0.0) * math.tanh(moved / room)  # what is warmer loses more
 
     def inflate(self, nu, R):
         root = math.sqrt(max(1.0, nu**2 / (self.P[1, 1] + R)))
@@ -88,7 +90,7 @@ class Filter:
         S, K = self.S, self.K
         self.x = self.x + K * nu
         if settling:
-            self.grow(K[0] * nu)
+            self.grow(K[0] * nu, room=settling)
         if not steady:
             A = np.eye(4) - np.outer(K, [0, 1, 0, 0])
             self.P = A @ self.P @ A.T + R * np.outer(K, K)
@@ -112,7 +114,8 @@ class Filter:
 class PlainBank:
     """The recipe step by step, and nothing but it."""
 
-    def __init__(self, h=1.0, u_min=0.0, u_max=1.0, kappa=0.6):
+    def __init__(self, h=1.0, u_min=0.0, u_max=1.0, kappa=0.6, room=40.0):
+        self.room, self.coldest, self.above, self.hot = room, math.inf, 0.0, 0
         self.h, self.u_min, self.u_max, self.kappa = h, u_min, u_max, kappa
         lags = [3.0 * 50.0 ** (i / 23.0) for i in range(24)]
         self.filters = [Filter(lag_s, shape, h) for lag_s in lags for shape in SHAPES]
@@ -154,7 +157,7 @@ class PlainBank:
         self.steady = self.settled and self.kept < 14 and e == 0 and away < 0.15
         self.steady &= not any(each.arrives(self.k * self.h) for each in self.filters)
         for each in self.filters:
-            each.predict(away, self.k * self.h, self.steady)
+            each.predict(away, self.k * self.h, self.steady, self.above, self.room)
         w = np.exp([each.ln_w for each in self.filters])
         expected = w @ [each.x[1] for each in self.filters] / w.sum()
         self.surprise = y - expected if self.k > 0 else math.nan
@@ -167,7 +170,11 @@ class PlainBank:
         if self.n >= 2:
             second = min((y - 2 * self.y1 + self.y2) ** 2 / 6, 9 * max(self.R_hat, 0.001))
             self.R_hat += (second - self.R_hat) * max(0.005, 1 / (self.n + 5))
-        self.y1, self.y2 = y, self.y1
+            self.coldest = min(self.coldest, max(y, self.y1, self.y2))  # no outlier lasts three
+        self.y1, self.y2, above = y, self.y1, self.above
+        cools = self.u_min < 0.0  # and may well have been colder than its room
+        self.above = 0.0 if cools else 0.9 * (y - self.coldest)
+        self.hot += self.above > self.room
         self.n += 1
         likeliest = max(self.filters, key=lambda each: each.ln_w)  # the first of equals
         nu_m, tempered = y - likeliest.x[1], 1.0
@@ -200,7 +207,7 @@ class PlainBank:
         self.steady &= not (jumped or found)
         heard = not jumped and self.k >= 4 and max(self.sums) <= 3
         heard &= self.k * self.h >= max(self.silent_until_s, self.learnt_from_s)
-        settling = self.k * self.h < self.silent_until_s
+        settling = self.k * self.h < self.silent_until_s and max(self.room, above)
         shares = [math.exp(each.ln_w) for each in self.filters]
         told = []
         for each in self.filters:
@@ -324,16 +331,19 @@ def eventful(samples, h, seed):
 
 
 @pytest.mark.parametrize(
-    ("h", "u_min", "samples"),
+    ("h", "u_min", "samples", "room"),
     [
-        pytest.param(1.0, 0.0, 2500, marks=pytest.mark.slow),
-        (5.0, 0.0, 150),
-        pytest.param(5.0, 0.0, 500, marks=pytest.mark.slow),
-        pytest.param(0.4, -0.3, 600, marks=pytest.mark.slow),
+        pytest.param(1.0, 0.0, 2500, 40.0, marks=pytest.mark.slow),
+        (5.0, 0.0, 150, 40.0),
+        (5.0, 0.0, 150, 6.0),
+        pytest.param(5.0, 0.0, 500, 40.0, marks=pytest.mark.slow),
+        pytest.param(0.4, -0.3, 600, 40.0, marks=pytest.mark.slow),
+        pytest.param(5.0, -0.3, 200, 6.0, marks=pytest.mark.slow),
     ],
 )
-def test_every_step_is_that_of_filters_run_one_by_one(h, u_min, samples):
-    bank, plain = Bank(h, u_min), PlainBank(h, u_min)
+def test_every_step_is_that_of_filters_run_one_by_one(h, u_min, samples, room):
+    bank = Bank(h, u_min, plants=Plants(room_k=room))
+    plain = PlainBank(h, u_min, room=room)
     belief, reading = bank.start()._replace(twin=None), eventful(samples, h, seed=7)
     u, jumps, drifts, saturated, largest = 0.0, 0, 0, 0, 0.0
     for k in range(samples):
@@ -367,4 +377,5 @@ def test_every_step_is_that_of_filters_run_one_by_one(h, u_min, samples):
     assert jumps > 0
     assert drifts > 0 or h < 1.0  # which is not at rest for long enough
     assert saturated > 0
+    assert (plain.hot > 50) == (room < 40.0 and u_min == 0.0)
     assert largest < 1e-9

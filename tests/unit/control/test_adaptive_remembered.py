@@ -200,6 +200,8 @@ BAD = {
     "more loss than power": {"loss_k_per_s": 0.05},
     "a loss that heats": {"loss_k_per_s": -0.05},
     "endless noise": {"noise_variance_k2": math.inf},
+    "a coldest of NaN": {"coldest_c": math.nan},
+    "a coldest that is no number": {"coldest_c": "cold"},
     "too few weights": {"log_weights": [0.0] * (N - 1)},
     "a weight of NaN": {"log_weights": [0.0] * (N - 1) + [math.nan]},
     "no weight of 0": {"log_weights": [-1.0] * N},
@@ -233,3 +235,25 @@ def test_a_cooler_remembers_as_a_heater_does():
     kept = cooler.remember(belief)
     again = cooler.observe(cooler.start_from(kept, 0.0), situation(20.0, 0.0))
     assert cooler.plant(again).gain_k_per_s == pytest.approx(-0.04, rel=0.1)
+
+
+def test_the_coldest_that_was_read_is_remembered(model):
+    assert model["coldest_c"] == pytest.approx(25.0, abs=0.1)
+    for bank in (start_of(model).bank, start_of(model).memory.rival):
+        assert bank.noise.coldest_c == model["coldest_c"]
+    hot = LAW.observe(start_of(model), situation(225.0, 0.0))
+    assert hot.bank.noise.above_k == pytest.approx(180.0, abs=0.1)
+    wrong_at_first = LAW.observe(hot, situation(205.0, 0.0))
+    assert wrong_at_first.bank.noise.above_k == pytest.approx(162.0, abs=0.1)
+
+
+@pytest.mark.parametrize("told", [{}, {"coldest_c": None}])
+def test_a_model_of_an_older_version_knows_of_no_coldest(model, told):
+    older = {name: each for name, each in model.items() if name != "coldest_c"}
+    assert start_of(older | told).bank.noise.coldest_c == math.inf
+
+
+def test_a_coldest_that_is_not_known_is_stored_as_such(model):
+    last = played(Tank(), 700)[-1]
+    noise = last.bank.noise._replace(coldest_c=math.inf)
+    assert LAW.remember(last._replace(bank=last.bank._replace(noise=noise)))["coldest_c"] is None

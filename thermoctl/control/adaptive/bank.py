@@ -162,10 +162,10 @@ class Bank:
         if full is None or x is None or belief.blind * self.period_s > BLIND_S:
             full = x = None
         elif (gains := self._kept(belief, excitation, unrest)) is None:
-            full = self._predicted(filters.joined(full, x), way, belief.sample + 1, unrest)
+            full = self._predicted(filters.joined(full, x), way, belief, unrest)
             x = full[:, X]
         else:
-            x = filters.moved(x, way.mean, self.hypotheses, self.constants)
+            x = filters.moved(x, way.mean, self.hypotheses, self.constants, belief.noise.above_k)
         twin = None if belief.twin is None else self.ahead(belief.twin.belief, applied)
         return Ahead(excitation, way, unrest, full, x, gains, twin)
 
@@ -252,11 +252,11 @@ class Bank:
         return belief._replace(blind=blind, gate=Gate(), path=way, gains=None, twin=None)
 
     def _predicted(
-        self, block: filters.Block, way: Path, sample: int, unrest: float
+        self, block: filters.Block, way: Path, belief: BankBelief, unrest: float
     ) -> filters.Block:
-        """Return the block predicted for `sample`."""
-        block = filters.predicted(block, way.mean, self.constants, unrest)
-        arrived = self._arrivals.get(sample)
+        """Return the block predicted for the sample after `belief`."""
+        block = filters.predicted(block, way.mean, self.constants, unrest, belief.noise.above_k)
+        arrived = self._arrivals.get(belief.sample + 1)
         if arrived is not None:
             filters.loosened(block, way.heat, arrived)
         return block
@@ -267,7 +267,7 @@ class Bank:
             block = filters.start(self.hypotheses, y_c, belief.prior, ahead.path.heat)
         else:
             block = filters.restarted(belief.block, self.hypotheses, y_c)
-        return self._predicted(block, ahead.path, belief.sample + 1, ahead.unrest)
+        return self._predicted(block, ahead.path, belief, ahead.unrest)
 
     def _misled(self, belief: BankBelief, block: filters.Block | None, y_c: float) -> bool:
         """Return whether the first reading was wrong, as the second one, `y_c`, is far from it.
@@ -292,13 +292,12 @@ class Bank:
 
     def _seen(self, belief: BankBelief, ahead: Ahead, y_c: float) -> Met:
         """Return what becomes of the prediction when the reading `y_c` meets it."""
-        sample, share = belief.sample + 1, ahead.excitation.share
-        drifting, m = belief.drifting, belief.weights.likeliest
-        block, x, gains = ahead.full, ahead.x, ahead.gains
+        sample, share, drifting = belief.sample + 1, ahead.excitation.share, belief.drifting
+        block, x, gains, m = ahead.full, ahead.x, ahead.gains, belief.weights.likeliest
         nu = math.nan if x is None else y_c - x.item(Z, m)
         noise, weights = self._noise(belief, nu, y_c)
         if belief.noise.samples == 1 and self._misled(belief, block, y_c):
-            belief, noise, x = belief._replace(full=None), Noise().after(y_c), None
+            belief, noise, x = belief._replace(full=None), belief.noise.anew(y_c), None
         if block is None or x is None:
             block, surprise_k = self._begun(belief, ahead, y_c), math.nan
             x, nu = block[:, X], y_c - block.item(Z, X, m)
@@ -320,7 +319,8 @@ class Bank:
         heard, before = self._heard(sample, share, noise, gate, drifting), block
         block, nis, S = filters.corrected(block, y_c, noise.believed, self.constants, share)
         if sample < gate.silent_until:  # what was poured in is colder, and loses less
-            filters.grown(block[D, X], block[T, X] - before[T, X], self.constants)
+            moved_k = block[T, X] - before[T, X]
+            filters.grown(block[D, X], moved_k, self.constants, belief.noise.above_k)
         self._limit(block, sample)
         gains = self._gains(belief, Corrected(before, block, S), drifting, still=still)
         if heard > 0.0:

@@ -81,9 +81,10 @@ class Plants:
         Growth of the noise of the loss per full range between power and holding power: water on its
         way to another temperature, glass and air behind it, loses what it did not lose before.
     room_k : float
-        A loss grows with the temperature as if the surroundings were this much colder. If that were
-        left to the noise of the loss, it would have to be learnt anew at every set point. Most
-        surroundings are nearer, and the loss grows faster.
+        A loss grows with the temperature as if the surroundings were this much colder, or by .9 of
+        how much colder the plant ever was, if that is more and nothing but them cools it. Left to
+        the noise of the loss, it would have to be learnt anew at every set point. Most surroundings
+        are nearer, and the loss grows faster.
     loosened_lags, loosened_share : float
         After this many lags the heat has arrived, and the gain is known well enough to limit the
         loss: gain and loss then become uncertain by this share.

@@ -166,7 +166,7 @@ class Adaptive:
         return belief._replace(bank=law.under(belief.bank, heat), memory=memory)
 
     def remember(self, belief: AdaptiveBelief) -> Mapping[str, Any] | None:
-        """Return gain, loss, noise and weights; None until known, or on trial."""
+        """Return gain, loss, noise, weights, coldest; None until known, or on trial."""
         if belief.memory.rival is not None or belief.doubt.stands:
             return None
         kept = remember(self.bank, belief.bank)

@@ -27,6 +27,9 @@ NOISE_MIN_K2 = 1e-5
 _SPREAD = 6.0  # variance of y - 2 y1 + y2 in units of the noise's: 1 + 4 + 1
 _MOST = 9.0  # a second difference counts as three standard deviations at most
 _MEMORY = 0.005  # of 200 samples
+NEARER = 0.9
+"""Share of the way from the coldest reading that counts. Radiation, vapour and walls that warm let
+a loss grow faster than in proportion, as if the surroundings were nearer."""
 _ROUNDED = 12.0  # the square of a step over the variance of what is rounded to it
 
 
@@ -54,6 +57,9 @@ class Noise(NamedTuple):
         The least variance that is believed, in K^2: that of rounding to such steps.
     colour : Colour
         What of the noise is not white.
+    coldest_c : float
+        The coldest that three readings in a row did not exceed; two are outliers. Surroundings are
+        no warmer than what only they cool.
     """
 
     variance: float = NOISE_START_K2
@@ -64,6 +70,7 @@ class Noise(NamedTuple):
     repeats: bool = False
     least: float = NOISE_MIN_K2
     colour: Colour = WHITE
+    coldest_c: float = math.inf
 
     def after(self, y_c: float, nu: float = math.nan, hearing: Hearing = USUAL) -> Noise:
         """Return the noise after the valid reading `y_c`.
@@ -77,11 +84,13 @@ class Noise(NamedTuple):
         hearing : Hearing
             What is taken for white.
         """
-        variance, last_c, before_last_c, n, step_k, repeats, least, colour = self
+        variance, last_c, before_last_c, n, step_k, repeats, least, colour, coldest_c = self
         if n >= 2:
             second = y_c - 2.0 * last_c + before_last_c
             square = min(second * second / _SPREAD, _MOST * max(variance, NOISE_START_K2))
             variance += (square - variance) * max(_MEMORY, 1.0 / (n + 5.0))
+            if y_c < coldest_c:
+                coldest_c = min(coldest_c, max(y_c, last_c, before_last_c))
         moved_k = abs(y_c - last_c)
         if moved_k == 0.0:
             repeats = True
@@ -91,7 +100,16 @@ class Noise(NamedTuple):
             least = max(step_k * step_k / _ROUNDED, NOISE_MIN_K2)
         if n >= GATE_SAMPLES and abs(nu) < hearing.noise_most_k:
             colour = colour.after(nu, variance, hearing)
-        return Noise(variance, y_c, last_c, n + 1, step_k, repeats, least, colour)
+        return Noise(variance, y_c, last_c, n + 1, step_k, repeats, least, colour, coldest_c)
+
+    def anew(self, y_c: float) -> Noise:
+        """Return the noise of a plant of which nothing but `y_c` has been read."""
+        return Noise(coldest_c=self.coldest_c).after(y_c)
+
+    @property
+    def above_k(self) -> float:
+        """How far the last reading was above its surroundings; NaN or < 0: not known."""
+        return NEARER * (self.last_c - self.coldest_c)
 
     @property
     def stands(self) -> bool:

@@ -43,7 +43,6 @@ GAIN_LEAST = 1e-4
 LOSS_MIN, LOSS_MAX = 0.5, 0.95
 """Bounds of the loss, in gains: LOSS_MIN below the least power, and LOSS_MAX of full power."""
 
-
 CAUGHT_UP = 0.03
 """Largest share by which a sample at rest is taken to change the variance of the loss."""
 
@@ -83,8 +82,8 @@ class PerPeriod(NamedTuple):
         Variances of T and beta that a period adds, over the square of the gain.
     noise_loss : float
         That of d at rest.
-    unrest, known_share : float
-        As in `Plants`.
+    unrest, known_share, room_k : float
+        As in `Plants`; the last endless where power cools too, and water may be colder than a room.
     noise_sensor : ndarray, shape (n,)
         Variance of z that it adds.
     gain_noisy : ndarray, shape (n,)
@@ -104,6 +103,7 @@ class PerPeriod(NamedTuple):
     noise_loss: float
     unrest: float
     known_share: float
+    room_k: float
     noise_sensor: Array
     gain_noisy: Array
     gain_min: Array
@@ -130,9 +130,10 @@ def per_period(hypotheses: Hypotheses, plants: Plants, u_min: float, u_max: floa
         noise_gain=plants.gain_drift**2 * h * one,
         noise_loss=plants.loss_drift**2 * h,
         unrest=plants.unrest,
+        known_share=plants.known_share,
+        room_k=plants.room_k if u_min == 0.0 else np.inf,
         per_room_k=one / plants.room_k,
         no_loss=0.0 * one,
-        known_share=plants.known_share,
         noise_sensor=plants.sensor_drift_k**2 * h * one,
         gain_noisy=GAIN_LEAST * h * one,
         gain_min=plants.gain_min_k_per_s * h * one,
@@ -171,18 +172,20 @@ def restarted(block: Block, hypotheses: Hypotheses, y_c: float) -> Block:
     return after
 
 
-def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0.0) -> Block:
+def predicted(
+    block: Block, heat: Array, constants: PerPeriod, unrest: float = 0.0, above_k: float = 0.0
+) -> Block:
     """Return the block one period later.
 
     T' = T - d + beta q and z' = z + a (T - z) + c (T' - T), exact for water that warms evenly
     within a period; `heat` is q in the mean of it. Where a period is as long as the lag, a sensor
     that knew of T alone would show nothing before the next one, and no hypothesis would fit.
-    `unrest` is how far the power was from what holds the water.
+    `unrest` is how far the power was from what holds the water, `above_k` as for `grown`.
     """
     after, a, c = block.copy(), constants.step, constants.soon
     water, sensor = after[T], after[Z]
     warming = _carried(water, sensor, block[D], block[BETA], heat, a, c)  # F [P | x]
-    grown(after[D, X], warming[X], constants)
+    grown(after[D, X], warming[X], constants, above_k)
     TT, ZT, ZZ = water[T], sensor[T], sensor[Z]
     towards = ZT - ZZ
     towards *= a[Z]
@@ -197,6 +200,8 @@ def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0
     ZZ += warming
     after[T, Z] = ZT  # and by symmetry elsewhere
     after[D:, :D] = after[:D, D:X].swapaxes(0, 1)
+    if above_k > constants.room_k:
+        _widened(after, block[D, X])
     DD, BB = after[D, D], after[BETA, BETA]
     b2 = np.maximum(block[BETA, X], constants.gain_noisy)
     b2 *= b2
@@ -207,12 +212,14 @@ def predicted(block: Block, heat: Array, constants: PerPeriod, unrest: float = 0
     return after
 
 
-def moved(x: Array, heat: Array, hypotheses: Hypotheses, constants: PerPeriod) -> Array:
+def moved(
+    x: Array, heat: Array, hypotheses: Hypotheses, constants: PerPeriod, above_k: float = 0.0
+) -> Array:
     """Return the states, shape (4, n), one period later as `predicted` does."""
     after, a, c = x.copy(), hypotheses.sensor_step, hypotheses.sensor_soon
     d = after[D]
     warming = _carried(after[T], after[Z], d, after[BETA], heat, a, c)
-    grown(d, warming, constants)
+    grown(d, warming, constants, above_k)
     return after
 
 
@@ -230,25 +237,35 @@ def _carried(
     return warming
 
 
-def grown(loss: Array, moved_k: Array, constants: PerPeriod) -> None:
+def grown(loss: Array, moved_k: Array, constants: PerPeriod, above_k: float) -> None:
     """Let the `loss` d go with water that has moved by `moved_k`, in place.
 
-    As d' = d + max(d, 0) tanh(moved / 40 K), which keeps its sign and cannot run away, however long
-    a period is. P is left as it is: beside the noise of d that is little. So is water that gains
-    heat from a warmer room: only who heats and cools has it.
+    As d' = d + max(d, 0) tanh(moved / r), which keeps its sign and cannot run away, however long a
+    period is; r is 40 K, or `above_k` where its surroundings are known to be farther away than
+    that. Water that gains heat from them is left alone: only who heats and cools has it.
     """
-    grows = np.tanh(moved_k * constants.per_room_k)
+    hot = above_k > constants.room_k
+    grows = np.tanh(moved_k / above_k if hot else moved_k * constants.per_room_k)
     grows *= np.maximum(loss, constants.no_loss)
     loss += grows
+
+
+def _widened(block: Block, before: Array) -> None:
+    """Let what is not known of a loss go as the loss has from `before`, in place.
+
+    So has its error. As long as r is `Plants.room_k` that is little beside the noise of d.
+    """
+    share = np.divide(block[D, X], before, out=np.ones_like(before), where=before > 0.0)
+    block[D, :X] *= share
+    block[:, D] *= share
 
 
 def arrivals(hypotheses: Hypotheses, plants: Plants) -> Mapping[int, Array]:
     """Return, by sample, how much is loosened where the heat has just arrived."""
     lags = hypotheses.lag_s / hypotheses.period_s
     samples = np.floor(plants.loosened_lags * lags) + 1.0
-    return {
-        int(sample): plants.loosened_share * (samples == sample) for sample in np.unique(samples)
-    }
+    share = plants.loosened_share
+    return {int(each): share * (samples == each) for each in np.unique(samples)}
 
 
 def loosened(block: Block, heat: Array, spread: Array) -> None:

@@ -1,9 +1,10 @@
 """What of a bank outlives a restart, and how firmly it is believed then.
 
-Gain, loss, noise and the weights of the hypotheses are worth keeping: they belong to the plant.
-Where the water was, and which power was on its way, are not. As plants change while nobody looks,
-gain and loss come back less certain than they were left, and the weights closer together. What
-comes back is on trial anyway (`thermoctl.control.adaptive.trial`).
+Gain, loss, noise and the weights of the hypotheses are worth keeping: they belong to the plant. So
+is the coldest that was read, for its surroundings are no warmer. Where the water was, and which
+power was on its way, are not. As plants change while nobody looks, gain and loss come back less
+certain than they were left, and the weights closer together. What comes back is on trial anyway
+(`thermoctl.control.adaptive.trial`).
 
 Implements section 9 of ``docs/theory.md``.
 """
@@ -47,6 +48,8 @@ WEIGHT_FLOOR = -5.0
 """Least log weight that is recalled: a few samples bring every hypothesis back."""
 
 NOISE_MAX_K2 = 100.0
+MOST_C = 3000.0
+"""Most that a sensor reads; of coolers temperatures are negated."""
 _DIGITS = 5
 
 
@@ -58,6 +61,7 @@ def remember(bank: Bank, belief: BankBelief) -> dict[str, Any] | None:
     rate, rate_sd = plant.gain_k_per_s, plant.gain_sd_k_per_s
     if not (rate > GAIN_LEAST and rate_sd <= KNOWN_SHARE * rate):
         return None
+    coldest_c = belief.noise.coldest_c
     return {
         "period_s": bank.period_s,
         "u_min": bank.u_min,
@@ -67,6 +71,7 @@ def remember(bank: Bank, belief: BankBelief) -> dict[str, Any] | None:
         "loss_k_per_s": _rounded(plant.loss_k_per_s),
         "loss_sd_k_per_s": _rounded(plant.loss_sd_k_per_s),
         "noise_variance_k2": _rounded(belief.noise.variance),
+        "coldest_c": _rounded(coldest_c) if math.isfinite(coldest_c) else None,
         "log_weights": [_rounded(each) for each in belief.weights.log.tolist()],
     }
 
@@ -89,6 +94,9 @@ def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBel
     lost = number(remembered, "loss_k_per_s", (bank.u_min - LOSS_MIN) * rate, LOSS_MAX * rate)
     lost_sd = number(remembered, "loss_sd_k_per_s", 0.0, gain_max)
     variance = number(remembered, "noise_variance_k2", 0.0, NOISE_MAX_K2)
+    coldest_c = math.inf
+    if remembered.get("coldest_c") is not None:  # files of older versions have none
+        coldest_c = number(remembered, "coldest_c", -MOST_C, MOST_C)
     log = _log_weights(remembered, len(bank.hypotheses))
     aged = math.sqrt(1.0 + max(age_s, 0.0) / DOUBLED_S)
     prior = Prior(
@@ -98,7 +106,7 @@ def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBel
         max(lost_sd, LOSS_SHARE * rate),
     )
     weights = weighted(np.maximum(WEIGHT_POWER * log, WEIGHT_FLOOR))
-    return bank.start(prior, Noise(variance), weights)
+    return bank.start(prior, Noise(variance, coldest_c=coldest_c), weights)
 
 
 def _hypotheses(bank: Bank) -> dict[str, Any]:
