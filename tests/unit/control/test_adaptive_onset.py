@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from thermoctl.control.adaptive import Adaptive, filters, path
-from thermoctl.control.adaptive.bank import ONSET_SAMPLES
 from thermoctl.control.adaptive.bank_belief import Twin
 from thermoctl.control.adaptive.constants import Hearing
 from thermoctl.control.adaptive.filters import BETA, Prior, T, X, Z
+from thermoctl.control.adaptive.twins import ONSET_SAMPLES
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
 
@@ -133,14 +133,14 @@ def test_what_is_foretold_lies_between_the_two():
     run(LAW, tank, 150)
     belief = bank.start()
     for _ in range(12):
-        y_c, ahead = tank.after(1.0), bank.ahead(belief, 1.0)
+        y_c, ahead = tank.after(1.0), bank.predict(belief, 1.0)
         twin = belief.twin
         each = [
-            bank.foretold(one._replace(twin=None), step, y_c)
+            bank.log_likelihood(one._replace(twin=None), step, y_c)
             for one, step in ((belief, ahead), (twin.belief, ahead.twin))
         ]
-        assert min(each) <= bank.foretold(belief, ahead, y_c) <= max(each)
-        belief = bank.met(belief, ahead, y_c)
+        assert min(each) <= bank.log_likelihood(belief, ahead, y_c) <= max(each)
+        belief = bank.correct(belief, ahead, y_c)
 
 
 def test_a_gap_of_unknown_power_ends_the_question():

@@ -85,5 +85,5 @@ def test_a_move_of_the_power_is_heard_until_its_heat_has_arrived(lag_s, heard_s)
 def test_a_long_lag_that_is_no_likelier_than_a_short_one_makes_no_difference():
     bank = Bank()
     belief = bank.observe(bank.start(), 25.0, 0.0)
-    after = bank.ahead(belief, 1.0).excitation
+    after = bank.predict(belief, 1.0).excitation
     assert after.mean_power == pytest.approx(1.0 / 50.0)

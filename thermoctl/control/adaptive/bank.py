@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from thermoctl.control.adaptive import evidence, filters, foretelling, path
-from thermoctl.control.adaptive.bank_belief import Ahead, BankBelief, Met, Twin
+from thermoctl.control.adaptive import evidence, filters, likelihood, path, twins
+from thermoctl.control.adaptive.bank_belief import BankBelief, Correction, Prediction, Twin
 from thermoctl.control.adaptive.coasting import outlook, renewed
 from thermoctl.control.adaptive.constants import Hearing, Lags, Plants
 from thermoctl.control.adaptive.evidence import (
@@ -40,8 +40,6 @@ LOSS_FROM_S = 60.0
 BLIND_S = 300.0
 """Time in s without a reading after which the filters stand still. Gain, loss and weights are kept;
 water and sensor begin anew."""
-ONSET_SAMPLES = 10
-"""Least number of samples that tell whether the plant was met at rest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,9 +142,9 @@ class Bank:
         ArithmeticError
             The result would not be finite; `belief` is still good.
         """
-        return self.met(belief, self.ahead(belief, applied), y_c)
+        return self.correct(belief, self.predict(belief, applied), y_c)
 
-    def ahead(self, belief: BankBelief, applied: float) -> Ahead:
+    def predict(self, belief: BankBelief, applied: float) -> Prediction:
         """Return the time update: what a period of `applied` makes of `belief`."""
         power = clamp(applied, self.u_min, self.u_max)
         way = path.pushed(belief.path, self.hypotheses, power)
@@ -166,8 +164,8 @@ class Bank:
             x = full[:, X]
         else:
             x = filters.moved(x, way.mean, self.hypotheses, self.constants, belief.noise.above_k)
-        twin = None if belief.twin is None else self.ahead(belief.twin.belief, applied)
-        return Ahead(excitation, way, unrest, full, x, gains, twin)
+        twin = None if belief.twin is None else self.predict(belief.twin.belief, applied)
+        return Prediction(excitation, way, unrest, full, x, gains, twin)
 
     def _kept(self, belief: BankBelief, excitation: Excitation, unrest: float) -> Gains | None:
         """Return the gains if they can be kept for one more sample; None if they cannot."""
@@ -182,7 +180,7 @@ class Bank:
         """Return whether the power is steady, and about what holds the water."""
         return share == 0.0 and unrest < self.hearing.quiet_power
 
-    def met(self, belief: BankBelief, ahead: Ahead, y_c: float) -> BankBelief:
+    def correct(self, belief: BankBelief, ahead: Prediction, y_c: float) -> BankBelief:
         """Return the measurement update, by the reading `y_c` at the end of `ahead`.
 
         Raises
@@ -190,39 +188,19 @@ class Bank:
         ArithmeticError
             The result would not be finite; `belief` is still good.
         """
-        after = self._met(belief, ahead, y_c)
-        return after if belief.twin is None else self._led(belief, ahead, after, y_c)
+        after = self._correct(belief, ahead, y_c)
+        if belief.twin is None or ahead.twin is None:
+            return after
+        other = self._correct(belief.twin.belief, ahead.twin, y_c)
+        return twins.led(belief, ahead, y_c, (after, other), self.hearing, self.period_s)
 
-    def foretold(self, belief: BankBelief, ahead: Ahead, y_c: float) -> float:
+    def log_likelihood(self, belief: BankBelief, ahead: Prediction, y_c: float) -> float:
         """Return the log likelihood of `y_c`; of twins that of both, as far as likely."""
-        most_sds, twin = self.hearing.gate_sds, belief.twin
-        alone = foretelling.of_reading(belief, ahead, y_c, belief.weights, most_sds)[0]
-        if twin is None or ahead.twin is None:
-            return alone
-        of = twin.belief
-        other = foretelling.of_reading(of, ahead.twin, y_c, of.weights, most_sds)[0]
-        return foretelling.of_both(alone, other, twin, self.hearing.onset_odds)
+        if belief.twin is not None and ahead.twin is not None:
+            return twins.log_likelihood(belief, ahead, y_c, self.hearing)
+        return likelihood.of_reading(belief, ahead, y_c, belief.weights, self.hearing.gate_sds)[0]
 
-    def _led(self, belief: BankBelief, ahead: Ahead, after: BankBelief, y_c: float) -> BankBelief:
-        """Return `after` or its twin, whichever leads, and for some time the other with it."""
-        twin, hearing = belief.twin, self.hearing
-        assert twin is not None
-        assert ahead.twin is not None
-        other = self._met(twin.belief, ahead.twin, y_c)
-        tell, most_sds = foretelling.of_reading, hearing.gate_sds
-        alone, weights = tell(belief, ahead, y_c, twin.beside, most_sds)
-        told, others = tell(twin.belief, ahead.twin, y_c, twin.weights, most_sds)
-        for_heat = told - alone if twin.heated else alone - told
-        odds = twin.odds + clamp(for_heat, -hearing.onset_most, hearing.onset_most)
-        heat_leads = odds > hearing.onset_odds
-        if heat_leads == twin.heated:
-            after, other, weights, others = other, after, others, weights
-        n = after.sample
-        if n >= ONSET_SAMPLES and n * self.period_s >= hearing.onset_s:
-            return after._replace(twin=None)
-        return after._replace(twin=Twin(other, odds, not heat_leads, others, weights))
-
-    def _met(self, belief: BankBelief, ahead: Ahead, y_c: float) -> BankBelief:
+    def _correct(self, belief: BankBelief, ahead: Prediction, y_c: float) -> BankBelief:
         """Return the belief after `y_c`, without a twin."""
         seen, way = math.isfinite(y_c), ahead.path
         if belief.full is None and not seen:
@@ -261,7 +239,7 @@ class Bank:
             filters.loosened(block, way.heat, arrived)
         return block
 
-    def _begun(self, belief: BankBelief, ahead: Ahead, y_c: float) -> filters.Block:
+    def _begun(self, belief: BankBelief, ahead: Prediction, y_c: float) -> filters.Block:
         """Return the block where nothing was foreseen: the first, or the first after a gap."""
         if belief.block is None:
             block = filters.start(self.hypotheses, y_c, belief.prior, ahead.path.heat)
@@ -281,16 +259,16 @@ class Bank:
         nu, S_m = y_c - float(block[Z, X, m]), float(block[Z, Z, m]) + belief.noise.believed
         return nu * nu > self.hearing.gate_sds**2 * S_m
 
-    def _unseen(self, belief: BankBelief, ahead: Ahead) -> Met:
+    def _unseen(self, belief: BankBelief, ahead: Prediction) -> Correction:
         """Return what becomes of the prediction without a reading: for some time, the belief."""
         _, blind, _, _, noise, gate, weights, drifting, *_ = belief
         stands = (blind + 1) * self.period_s > BLIND_S
         full, x = (belief.full, belief.x) if stands or ahead.x is None else (ahead.full, ahead.x)
         assert full is not None
         assert x is not None
-        return Met(noise, gate, weights, drifting, 0.0, math.nan, full, x)
+        return Correction(noise, gate, weights, drifting, 0.0, math.nan, full, x)
 
-    def _seen(self, belief: BankBelief, ahead: Ahead, y_c: float) -> Met:
+    def _seen(self, belief: BankBelief, ahead: Prediction, y_c: float) -> Correction:
         """Return what becomes of the prediction when the reading `y_c` meets it."""
         sample, share, drifting = belief.sample + 1, ahead.excitation.share, belief.drifting
         block, x, gains, m = ahead.full, ahead.x, ahead.gains, belief.weights.likeliest
@@ -307,7 +285,7 @@ class Bank:
         S_m = block.item(Z, Z, m) + noise.believed if gains is None else gains.S.item(m)
         gate = self._gated(belief, nu, S_m)
         if gate.outlier:
-            return Met(noise, gate, weights, drifting, 0.0, surprise_k, block, x)
+            return Correction(noise, gate, weights, drifting, 0.0, surprise_k, block, x)
         if sample >= drifting.silent_until:
             drifting = self._drifted(belief, still, nu / math.sqrt(S_m))
         if gate.jumped or drifting.found:
@@ -315,7 +293,7 @@ class Bank:
             block, drifting, gains = self._disturbed(belief, block, gate, nu, noise.believed)
         if gains is not None:
             x, gains = filters.followed(x, y_c, gains.K, self.constants), gains.older(kept=True)
-            return Met(noise, gate, weights, drifting, 0.0, surprise_k, block, x, gains)
+            return Correction(noise, gate, weights, drifting, 0.0, surprise_k, block, x, gains)
         heard, before = self._heard(sample, share, noise, gate, drifting), block
         block, nis, S = filters.corrected(block, y_c, noise.believed, self.constants, share)
         if sample < gate.silent_until:  # what was poured in is colder, and loses less
@@ -327,7 +305,9 @@ class Bank:
             weights = weights.after(heard, nis, S)
         elif sample < gate.silent_until and not gate.jumped:
             weights = weights.among_shapes(nis, S)
-        return Met(noise, gate, weights, drifting, heard, surprise_k, block, block[:, X], gains)
+        return Correction(
+            noise, gate, weights, drifting, heard, surprise_k, block, block[:, X], gains
+        )
 
     def _limit(self, block: filters.Block, sample: int) -> None:
         """Limit the gain and, as soon as that is known, the loss; in place."""

@@ -98,7 +98,7 @@ class Twin(NamedTuple):
     beside: Weights
 
 
-class Ahead(NamedTuple):
+class Prediction(NamedTuple):
     """The time update: what a period makes of a belief before its reading is seen.
 
     Parameters
@@ -114,7 +114,7 @@ class Ahead(NamedTuple):
         The states foreseen.
     gains : Gains or None
         Those that are kept; None where they are to be reckoned.
-    twin : Ahead or None
+    twin : Prediction or None
         The same of the twin.
     """
 
@@ -124,10 +124,10 @@ class Ahead(NamedTuple):
     full: filters.Block | None
     x: Array | None
     gains: Gains | None = None
-    twin: Ahead | None = None
+    twin: Prediction | None = None
 
 
-class Met(NamedTuple):
+class Correction(NamedTuple):
     """The measurement update: the part of a belief that readings change."""
 
     noise: Noise

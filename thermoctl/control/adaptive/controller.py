@@ -194,9 +194,9 @@ class Adaptive:
                 bank, behind_s, since_s, given_s, belief.doubt, memory, belief.sds, inexact=inexact
             )
         for _ in range(periods - 1):
-            bank, memory = trial.met(self.bank, bank, memory, math.nan, power)
+            bank, memory = trial.observe(self.bank, bank, memory, math.nan, power)
         sign = self._sign
-        bank, memory = trial.met(self.bank, bank, memory, sign * situation.measured_c, power)
+        bank, memory = trial.observe(self.bank, bank, memory, sign * situation.measured_c, power)
         doubt = belief.doubt.after(_doubt(bank.outlook, self.plants))
         sds = self._sds(bank, memory) if _due(bank) else belief.sds
         surprise_k = math.nan if gathered or periods > 1 else sign * bank.surprise_k

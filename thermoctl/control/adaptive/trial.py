@@ -1,10 +1,11 @@
 """Whether a remembered bank foresees better than one that knows nothing.
 
 Both see the same samples, and the remembered one steers. Every reading is a prediction put to the
-test: the log odds between the two grow by the difference of its log likelihoods, `Bank.foretold`,
-as far as the sample counts as evidence, ALF (6)-(7) with two models in place of many. So the
-odds are those of Bayes: a model that is right gains on one that expects anything, and one that is
-wrong loses to it. The loser is dropped, and from then on there is one bank again.
+test: the log odds between the two grow by the difference of its log likelihoods,
+`Bank.log_likelihood`, as far as the sample counts as evidence, ALF (6)-(7) with two models in
+place of many. So the odds are those of Bayes: a model that is right gains on one that expects
+anything, and one that is wrong loses to it. The loser is dropped, and from then on there is one
+bank again.
 
 Implements section 9 of ``docs/theory.md``.
 """
@@ -59,22 +60,24 @@ class Memory:
         return {TRUSTED: "stored", DROPPED: "dropped"}.get(self.verdict, "new")
 
 
-def met(
+def observe(
     law: Bank, bank: BankBelief, memory: Memory, y_c: float, applied: float
 ) -> tuple[BankBelief, Memory]:
     """Return bank and trial after a period of `applied` and the reading `y_c`."""
-    ahead, rival = law.ahead(bank, applied), memory.rival
-    after = law.met(bank, ahead, y_c)
+    ahead, rival = law.predict(bank, applied), memory.rival
+    after = law.correct(bank, ahead, y_c)
     if rival is None:
         return after, memory
-    rivals = law.ahead(rival, applied)
+    rivals = law.predict(rival, applied)
     odds, heard = memory.odds, 0.0
     if math.isfinite(y_c) and after.sample >= EVIDENCE_FROM:
         heard = after.excitation.share
     if heard > 0.0:
-        odds += heard * (law.foretold(bank, ahead, y_c) - law.foretold(rival, rivals, y_c))
+        odds += heard * (
+            law.log_likelihood(bank, ahead, y_c) - law.log_likelihood(rival, rivals, y_c)
+        )
     heard_s = memory.heard_s + heard * law.period_s
-    return _judged(after, Memory(law.met(rival, rivals, y_c), odds, heard_s))
+    return _judged(after, Memory(law.correct(rival, rivals, y_c), odds, heard_s))
 
 
 def lost(law: Bank, bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:

@@ -9,13 +9,13 @@ import math
 
 import numpy as np
 
-from thermoctl.control.adaptive.bank_belief import Ahead, BankBelief, Twin
+from thermoctl.control.adaptive.bank_belief import BankBelief, Prediction
 from thermoctl.control.adaptive.evidence import Weights
 from thermoctl.control.adaptive.filters import Z
 
 
 def of_reading(
-    belief: BankBelief, ahead: Ahead, y_c: float, weights: Weights, most_sds: float
+    belief: BankBelief, ahead: Prediction, y_c: float, weights: Weights, most_sds: float
 ) -> tuple[float, Weights]:
     r"""Return the log likelihood of `y_c`, and what it leaves of the weights.
 
@@ -33,14 +33,3 @@ def of_reading(
     most = float(log.max())
     told = most + math.log(float(np.exp(log - most).sum() * weights.share.max()))
     return told, weights.after(1.0, nis, S)
-
-
-def of_both(alone: float, other: float, twin: Twin, onset_odds: float) -> float:
-    """Return the log likelihood of two that are as likely as the odds of `twin` say.
-
-    `other` is that of the twin; beyond `onset_odds` there was heat.
-    """
-    odds = twin.odds - onset_odds
-    share = 0.5 * (1.0 + math.tanh(0.5 * (odds if twin.heated else -odds)))
-    most = max(alone, other)
-    return most + math.log((1.0 - share) * math.exp(alone - most) + share * math.exp(other - most))
