@@ -56,7 +56,7 @@ def led(
 
 
 def log_likelihood(belief: BankBelief, ahead: Prediction, y_c: float, hearing: Hearing) -> float:
-    """Return the log likelihood of `y_c` by `belief` and its twin, as likely as each is."""
+    """Return the log likelihood of `y_c` by both twins, as likely as each is."""
     twin = belief.twin
     assert twin is not None
     assert ahead.twin is not None
