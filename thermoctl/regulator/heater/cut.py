@@ -20,6 +20,10 @@ class Cut(NamedTuple):
         Since when there was a doubt, where a load may be the reason of it.
     crept : bool
         Whether nothing is in doubt but why the power that holds the reading has grown.
+    portion : bool
+        Whether a little heat was given first, after a bad answer, to a reading that stood still.
+    quiet : bool
+        Whether nobody is told yet: the next heat was announced as the question.
     """
 
     at_s: float
@@ -28,3 +32,5 @@ class Cut(NamedTuple):
     wild: bool = False
     began_s: float | None = None
     crept: bool = False
+    portion: bool = False
+    quiet: bool = False

@@ -14,12 +14,16 @@ no more in a block than a heater could do, so that a litre of cold water is soon
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from thermoctl.quantities import clamp
+from thermoctl.regulator.heater import fall
 from thermoctl.regulator.heater.balance import balance
 from thermoctl.regulator.heater.blocks import Block
+from thermoctl.regulator.heater.cut import Cut
+from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S, CREPT_LAGS
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Heat, Seen
+from thermoctl.regulator.heater.silence import Silence
 
 DOUBT_K, DOUBT_SDS, DOUBT_LAGS = 0.3, 5.0, 1.0
 """A sum is a doubt when it exceeds all three: DOUBT_K in K, DOUBT_SDS standard deviations of a
@@ -107,6 +111,7 @@ class HeatDoubt:
         self.since: Seen | None = None
         self._begin: Seen | None = None  # of what is taken together
         self._jumped = False
+        self._silence = Silence()
         self.clear()
 
     def clear(self) -> None:
@@ -114,6 +119,7 @@ class HeatDoubt:
         self._missing_k = self._extra_k = self._crept_s = 0.0
         self.since = self._begin = None
         self._jumped = False
+        self._silence.clear()
 
     def trust(
         self,
@@ -190,6 +196,28 @@ class HeatDoubt:
             return False
         return self._missing_k > _limit_k(gain, sd_k, DOUBT_LAGS_AGAIN if again else DOUBT_LAGS)
 
+    def silent(self, gain: Gain, now: Seen, sd_k: float, *, again: bool) -> Cut | None:
+        """Return why to ask a strong heater of which the reading shows nothing."""
+        if again and self.short(gain, sd_k, again=True):
+            return None  # what is missing is reason enough, and says more
+        answered = self._answered_s > 0.0
+        return self._silence.question(gain, now, sd_k, again=again, answered=answered)
+
+    def question(
+        self, rows: Collection[Seen], gain: Gain, now: Seen, sd_k: float, *, hot: bool, again: bool
+    ) -> Cut | None:
+        """Return why to cut the power now: for what is missing, or for being `hot`."""
+        lags = CREPT_LAGS if self.crept else BEFORE_LAGS
+        from_s = now.t_s - max(lags * gain.lag_s, BEFORE_S)
+        since_s = from_s if self.since is None else min(self.since.t_s, from_s)
+        wild = not again and fall.wild(rows, (since_s, from_s), gain, self.loss(gain))
+        lasts = wild and now.t_s - since_s >= max(BEFORE_LAGS * gain.lag_s, fall.WILD_S)
+        if not (hot or lasts or self.cold(gain, sd_k, again=again)):
+            return None
+        wild = wild or (not again and self._silence.fell(gain, sd_k))
+        began_s = None if hot or wild else since_s
+        return Cut(now.t_s, from_s, self.told(gain, now), wild, began_s)
+
     @property
     def crept_s(self) -> float:
         """How long the loss has been larger while the reading stood still, in s."""
@@ -229,9 +257,9 @@ class HeatDoubt:
         span_s, rise_k = now.t_s - before.t_s, now.reading_c - before.reading_c
         heat_k = gain.mean * (now.heat_s[gain.place] - before.heat_s[gain.place])
         full_k = gain.mean * span_s
-        self._coldest_c = min(self._coldest_c, now.reading_c)
-        self._cool(gain, span_s)
+        self._cool(gain, span_s, now.reading_c)
         loss_k = (self.loss(gain) + self._unseen(gain, now.reading_c)) * span_s
+        self._silence.add(gain, block, before, now, loss_k)
         self._answered_s -= span_s
         large = proven and self._answered_s <= 0.0 and loss_k > MUCH_SHARE * full_k
         missing_k = self._missing_k - FULL_SHARE * full_k
@@ -265,8 +293,9 @@ class HeatDoubt:
             return above_k * max(gain.cools_per_s, 1.0 / COOLS_WITHIN_S)
         return above_k * SURE_SHARE * gain.cools_per_s
 
-    def _cool(self, gain: Gain, span_s: float) -> None:
+    def _cool(self, gain: Gain, span_s: float, reading_c: float) -> None:
         """Remember how fast the plant surely cooled a while ago."""
+        self._coldest_c = min(self._coldest_c, reading_c)
         self._cools_s -= span_s
         if gain.cools_per_s > 0.0:
             self._cools_s = COOLED_S

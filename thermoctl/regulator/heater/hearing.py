@@ -20,6 +20,10 @@ HEARD_S, HEARD_LAGS = 20.0, 0.5
 a known one."""
 BAD_S, BAD_LAGS = 60.0, 2.0
 """The same for a bad answer."""
+QUIET_LAGS = 3.0
+"""Time in lags after which a heater that has given a little heat is late with its answer."""
+RISES_SDS = 5.0
+"""Standard deviations of a reading by which it has risen."""
 LIKELY = "{:.0f} s without power do not show it surely, but a gain of {:.2g} K/s is likely"
 LOAD = "after {:.0f} s without power a load explains why more was needed, a dead heater does not"
 HIDDEN = "{:.0f} s without power show less than a load that comes and goes may hide"
@@ -30,6 +34,13 @@ def believed_s(known: Gain | None, lag_s: float) -> tuple[float, float]:
     if known is None:
         return HEARD_S, BAD_S
     return HEARD_LAGS * lag_s, BAD_LAGS * lag_s
+
+
+def tells(answer: Answer, asked_s: float, lag_s: float) -> bool:
+    """Return whether to tell of a quiet question: its answer is late, or bad."""
+    if asked_s >= QUIET_LAGS * lag_s:
+        return answer is not Answer.HEATS
+    return asked_s >= BAD_LAGS * lag_s and answer in (Answer.NOTHING, Answer.COOLS)
 
 
 def answer(
@@ -53,6 +64,9 @@ def answer(
     found, shown = question.of_known_rows(rows, cut.from_s, cut.at_s, known, sd_k, sure)
     late = sure < question.SURE
     if cut.began_s is None:
+        unsure = cut.portion and found in (Answer.OPEN, Answer.LATE)
+        if unsure and _nothing_came(rows, cut, known, sd_k):
+            found = Answer.NOTHING
         return (Answer.OPEN if found is Answer.LATE else found), shown
     if found is Answer.HEATS and not late:
         return found, shown
@@ -72,3 +86,15 @@ def rising(rows: Collection[Seen], known: Gain, now: Seen, off_s: float, sd_k: f
     """Return how fast the reading has surely risen without power, in K/s."""
     from_s = now.t_s - min(max(OFF_LAGS * known.lag_s, question.BEFORE_S), off_s)
     return question.slope(rows, from_s, less_sd_k=sd_k)
+
+
+def _nothing_came(rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float) -> bool:
+    """Return whether a portion of heat has left a reading where it stood.
+
+    A longer lag is not asked for: it would bend, but also lift, a reading that comes to rest.
+    """
+    meant = [row for row in rows if row.t_s >= cut.from_s]
+    found = question.contrast(meant, sd_k)
+    if found is None or meant[-1].reading_c - meant[0].reading_c > RISES_SDS * sd_k:
+        return False
+    return question.is_nothing(found, known, range(max(known.place - 1, 0), known.place + 1))

@@ -124,7 +124,7 @@ def of_known(found: Contrast, known: Gain, sure: float = SURE) -> tuple[Answer, 
             return Answer.HEATS, shown
         answer = Answer.COOLS
     else:
-        answer = Answer.NOTHING if _is_nothing(found, known, places) else Answer.OPEN
+        answer = Answer.NOTHING if is_nothing(found, known, places) else Answer.OPEN
     return (Answer.LATE if _is_late(found, known, shown) else answer), shown
 
 
@@ -135,8 +135,8 @@ def _is_late(found: Contrast, known: Gain, shown: Gain) -> bool:
     return explains and later.mean > max(ANSWERS * known.mean, SURE * later.sd)
 
 
-def _is_nothing(found: Contrast, known: Gain, places: Iterable[int]) -> bool:
-    """Return whether all that `found` shows under the lags of `places` is surely little."""
+def is_nothing(found: Contrast, known: Gain, places: Iterable[int]) -> bool:
+    """Return whether all that `found` shows under these lags is surely little."""
     small = [abs(found.mean[place]) < NOTHING * known.mean for place in places]
     seen = [SURE * found.sd[place] < known.mean for place in places]
     return all(small) and all(seen)

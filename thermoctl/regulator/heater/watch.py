@@ -131,8 +131,6 @@ class HeaterWatch:
         self._rows.clear()
         self._cut = None
 
-    # -- a block ---------------------------------------------------------------------------------
-
     def _evaluate(self, block: Block, t_s: float) -> None:
         """Evaluate a complete block."""
         known, sd_k = self._heater.gain, block.sd_k
@@ -224,23 +222,18 @@ class HeaterWatch:
             heat_s = now.heat_s[known.place] - before.heat_s[known.place]
             self._distrusted_k -= known.mean * heat_s
         hot = doubt.hot(known, sd_k) and self._heater.seen  # less water is no fault
+        silent = doubt.silent(known, now, sd_k, again=again)
         if hot and self._off_s >= self._heater.under_way_s:
             rate = hearing.rising(self._rows, known, now, self._off_s, sd_k)
             if rate > 0.0:  # nothing is proven while too few readings show a slope
                 self._fail("heater.stuck_on", question.told_of(rate), t_s)
-        elif doubt.creeps(known, sd_k, again=again) and not hot and block.power >= OFF:
+        elif not (silent or hot or block.power < OFF) and doubt.creeps(known, sd_k, again=again):
             self._ask_of_creep(known, now, sd_k)
-        elif hot or (doubt.cold(known, sd_k, again=True) and block.power >= OFF):
-            lags = CREPT_LAGS if doubt.crept else BEFORE_LAGS
-            from_s = self._t_s - max(lags * known.lag_s, BEFORE_S)
-            since_s = from_s if doubt.since is None else min(doubt.since.t_s, from_s)
-            wild = not again and fall.wild(self._rows, (since_s, from_s), known, doubt.loss(known))
-            lasts = wild and self._t_s - since_s >= max(BEFORE_LAGS * known.lag_s, fall.WILD_S)
-            if hot or lasts or doubt.cold(known, sd_k, again=again):
-                began_s = None if hot or wild else since_s
-                if began_s is not None and not again and self._acquits(known, doubt, sd_k):
-                    return
-                self._ask(Cut(now.t_s, from_s, doubt.told(known, now), wild, began_s))
+        elif hot or ((silent or doubt.cold(known, sd_k, again=True)) and block.power >= OFF):
+            cut = silent or doubt.question(self._rows, known, now, sd_k, hot=hot, again=again)
+            weighs = cut is not None and cut.began_s is not None and not again
+            if cut is not None and not (weighs and self._acquits(known, doubt, sd_k)):
+                self._ask(cut)
 
     def _acquits(self, known: Gain, why: HeatDoubt | Climb, sd_k: float) -> bool:
         """Return whether the heater has answered unasked to `why` it is in doubt."""
@@ -258,15 +251,17 @@ class HeaterWatch:
             self._doubt.stand_by()
             return
         from_s = now.t_s - max(CREPT_LAGS * known.lag_s, BEFORE_S)
-        why = self._doubt.told(known, now)
-        self._ask(Cut(now.t_s, from_s, why, began_s=began_s, crept=True))
-
-    # -- a question ------------------------------------------------------------------------------
+        self._ask(Cut(now.t_s, from_s, self._doubt.told(known, now), began_s=began_s, crept=True))
 
     def _ask(self, cut: Cut) -> None:
         self._cut = cut
         if self._heater.gain is not None:
             self._ceiling.follow(self._rows, self._heater.gain, cut.at_s)
+        if not cut.quiet:
+            self._tell(cut)
+
+    def _tell(self, cut: Cut) -> None:
+        self._cut = cut._replace(quiet=False)
         self._emit("heater.questioned", text=f"{cut.why}; power is cut to see what it does")
 
     def _look_for_answer(self, cut: Cut, block: Block, now: Seen, t_s: float) -> None:
@@ -278,6 +273,8 @@ class HeaterWatch:
         if known is None and answer is Answer.HEATS and not arrived(shown, now):
             answer = Answer.OPEN  # what wanders in the air is as long as the longest lags
         heard_s, bad_s = hearing.believed_s(known, lag_s)
+        if cut.quiet and hearing.tells(answer, asked_s, lag_s):
+            self._tell(cut)
         if answer is Answer.HEATS:
             if asked_s >= heard_s:
                 self._accept(shown, asked_s)
@@ -339,7 +336,8 @@ class HeaterWatch:
         text = f"{asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s"
         if shown is self.known:  # not by the question alone
             text = hearing.LOAD.format(asked_s)
-        self._emit("heater.answered", text=text)
+        if self._cut is None or not self._cut.quiet:
+            self._emit("heater.answered", text=text)
         self._heater.accept(shown, more=self._cut is None or self._cut.began_s is None)
         self._trial.begin(self._t_s)
         self._distrusted_k = 0.0
