@@ -24,14 +24,15 @@ class AlarmRegister:
     def set(self, alarm: Alarm) -> bool:
         """Make `alarm` active; return whether it was not. One that was keeps its time.
 
-        It may have become more urgent; what has been acknowledged was the less urgent one then.
+        It may have become more urgent, a latch most of all; what has been acknowledged was the less
+        urgent one then.
         """
         row = self._rows.get(alarm.code)
         if row is not None and row.active:
-            if alarm.latched and not row.latched:
-                self._put(replace(row, latched=True, priority=1, text=alarm.text))
-            elif alarm.priority < row.priority:
-                self._put(replace(alarm, since_s=row.since_s))
+            latches = alarm.latched and not row.latched
+            if latches or alarm.priority < row.priority:
+                latched = alarm.latched or row.latched
+                self._put(replace(alarm, since_s=row.since_s, latched=latched))
             return False
         self._put(alarm)
         return True

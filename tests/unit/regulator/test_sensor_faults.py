@@ -5,6 +5,7 @@ import math
 import pytest
 
 from thermoctl.regulator import Regulator
+from thermoctl.regulator.alarms import AlarmRegister
 from thermoctl.signals import Acknowledge, Alarm, Measurement, Mode, Quality, State
 
 PAPER = {"kind": "self-tuning-mv", "reference_time_s": 60.0}  # knows no holding power at first
@@ -108,6 +109,15 @@ def test_an_alarm_that_was_a_warning_when_it_was_acknowledged_rings_anew_when_it
     assert [(row.priority, row.acknowledged) for row in acknowledged] == [(2, True)]
     assert [(row.priority, row.acknowledged) for row in off] == [(1, False)]
     assert off[0].since_s == warned[0].since_s
+
+
+def test_a_latch_is_to_be_acknowledged_although_the_alarm_before_it_was():
+    alarms, code = AlarmRegister(), "trip.over_temperature"
+    alarms.set(Alarm(code, 9, 1, 5.0, "a first reading"))
+    alarms.acknowledge(code)
+    alarms.set(Alarm(code, 9, 1, 6.0, "a second reading", latched=True))
+    alarms.set(Alarm(code, 9, 1, 7.0, "a third reading"))
+    assert alarms.rows() == (Alarm(code, 9, 1, 5.0, "a second reading", latched=True),)
 
 
 def test_before_a_model_is_known_the_last_output_is_held_for_three_seconds(drive_with):
