@@ -154,3 +154,20 @@ def test_an_output_of_a_lab_that_sticks_above_what_holds_gets_no_power_and_is_to
         print(f"stuck above what holds, {controller}, lab {seed}: {told_s} s, {above_k:+.1f} K")
         assert told_s < 480
         assert max(told.command.power for told in after[60:]) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("seed", "swing_k", "period_s"), [(1, 2.5, 60), (1, 2.0, 40), (2, 1.5, 55), (7, 2.5, 40)]
+)
+@pytest.mark.slow
+def test_a_sensor_in_air_that_swings_is_not_taken_for_one_that_answers(seed, swing_k, period_s):
+    lab = Lab("adaptive", seed)
+    lab.live(700)
+    lab.fallen, room_c, began_s = True, lab.parameters.room_c, lab.t_s
+    while lab.steps[-1].state is not State.LATCHED:
+        after_s = lab.t_s - began_s
+        assert after_s < 480, lab.questions()
+        air_c = room_c + swing_k * math.sin(2.0 * math.pi * after_s / period_s)
+        lab.parameters = replace(lab.parameters, room_c=air_c)
+        lab.live(1)
+    print(f"air that swings by {swing_k} K in {period_s} s, lab {seed}: latched after {after_s} s")

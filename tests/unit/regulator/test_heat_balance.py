@@ -3,10 +3,15 @@
 import pytest
 
 from thermoctl.regulator.heater.balance import balance, brought_back
+from thermoctl.regulator.heater.check import HeaterCheck
 from thermoctl.regulator.heater.doubt import HeatDoubt
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
+from thermoctl.regulator.heater.watch import HeaterWatch
+from thermoctl.regulator.limits import Limits
+from thermoctl.regulator.supervisor import Supervisor
 
 GAIN = Gain(0.05, 0.001, 2)
+LIMITS = Limits(200.0, -50.0, -50.0, 200.0)
 
 
 def rows(power, loss, seconds=120):
@@ -47,16 +52,40 @@ def test_noise_is_not_brought_back():
     assert not brought_back(readings([40.0, 39.98, 40.01, 39.99]), 0.0, 0.01)
 
 
-def test_a_second_answer_of_late_teaches_the_loss_and_the_first_does_not():
-    doubt, load = HeatDoubt(), rows(0.5, 0.02)
-    doubt.trust(GAIN, load, 0.0)
-    assert doubt.loss(GAIN) == 0.0
-    doubt.trust(GAIN, load, 0.0)
-    assert doubt.loss(GAIN) == pytest.approx(0.02)
-
-
 def test_a_loss_does_not_shrink_by_an_answer():
     doubt = HeatDoubt()
     doubt.acquit(GAIN, rows(0.5, 0.02), 0.0)
     doubt.acquit(GAIN, rows(0.5, 0.01), 0.0)
     assert doubt.loss(GAIN) == pytest.approx(0.02)
+
+
+def unheard(name, **fields):
+    """Take an event, and tell nobody."""
+
+
+def watch_of_a_dip():
+    """Return a watch that has seen a load, and more power that brings the reading back."""
+    watch = HeaterWatch(HeaterCheck(), 1.0, Supervisor(LIMITS, unheard), unheard)
+    reading_c, heat_s = 40.0, 0.0
+    for n in range(60):
+        power = 0.4 if n < 25 else 1.0
+        load = 0.02 if n < 20 else 0.04
+        heat_s += 4.0 * power
+        reading_c += 4.0 * (GAIN.mean * power - load)
+        watch._rows.append(Seen(4.0 * n, reading_c + 0.005 * (-1) ** n, (heat_s,) * len(LAGS_S)))
+    return watch
+
+
+@pytest.mark.parametrize(
+    ("spoil", "acquits"),
+    [
+        (lambda watch: None, True),
+        (lambda watch: watch._verdicts.note(watch._t_s), False),
+        (lambda watch: setattr(watch, "_distrusted_k", 1.0), False),
+    ],
+)
+def test_what_gave_a_bad_answer_of_late_is_not_acquitted(spoil, acquits):
+    watch, doubt = watch_of_a_dip(), HeatDoubt()
+    doubt.since = watch._rows[25]
+    spoil(watch)
+    assert watch._acquits(GAIN, doubt, 0.01) is acquits

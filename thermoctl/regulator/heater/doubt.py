@@ -121,34 +121,23 @@ class HeatDoubt:
         self._jumped = False
         self._silence.clear()
 
-    def trust(
-        self,
-        gain: Gain | None = None,
-        rows: Iterable[Seen] = (),
-        since_s: float | None = None,
-    ) -> None:
+    def trust(self) -> None:
         """Take the power for what holds the plant: the heater was asked, and answers.
 
-        Where heat was missing since `since_s`, and for the second time of late, so is the loss. By
-        one answer it is not, for that of a sensor in the air may look like a good one.
+        The loss is left as it is. Answers of a sensor in the air may look like good ones, and under
+        a loss that explains all of its heat nothing would ever be asked again.
         """
-        if gain is not None and since_s is not None and self._answered_s > 0.0:
-            self._lose(gain, rows, since_s)
         self.stand_by()
         self._answered_s = ANSWERED_S
 
     def acquit(self, gain: Gain, rows: Iterable[Seen], since_s: float) -> None:
-        """Take the loss for what it is since `since_s`: the heater has answered unasked."""
-        self._lose(gain, rows, since_s)
-        self.stand_by()
-        self.clear()
-
-    def _lose(self, gain: Gain, rows: Iterable[Seen], since_s: float) -> None:
-        """Take the loss for what it was seen to be since `since_s`, if it has grown."""
+        """Take the loss for what it was since `since_s`, if it has grown."""
         seen = balance(rows, since_s, gain)
         if seen is not None and seen.loss > self.loss(gain):
             self._rates, self._level_c = seen.rates, seen.level_c
             self._rise_rate = gain.mean * seen.rates[gain.place] - seen.loss
+        self.stand_by()
+        self.clear()
 
     def stand_by(self) -> None:
         """Take the power that is needed now for what holds the reading."""

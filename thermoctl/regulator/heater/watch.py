@@ -178,7 +178,7 @@ class HeaterWatch:
             self._emit("heater.answered", text=ceiling.TEXT.format(self.ceiling_c))
         self._trial.begin(self._t_s)
         self._verdicts.take_back()
-        self._cut, self._distrusted_k = None, 0.0  # at its ceiling a plant shows no loss
+        self._distrusted_k = 0.0
         self._trust()
 
     def _disown(self, now: Seen) -> None:
@@ -231,12 +231,17 @@ class HeaterWatch:
             self._ask_of_creep(known, now, sd_k)
         elif hot or ((silent or doubt.cold(known, sd_k, again=True)) and block.power >= OFF):
             cut = silent or doubt.question(self._rows, known, now, sd_k, hot=hot, again=again)
-            weighs = cut is not None and cut.began_s is not None and not again
+            weighs = cut is not None and cut.began_s is not None
             if cut is not None and not (weighs and self._acquits(known, doubt, sd_k)):
                 self._ask(cut)
 
     def _acquits(self, known: Gain, why: HeatDoubt | Climb, sd_k: float) -> bool:
-        """Return whether the heater has answered unasked to `why` it is in doubt."""
+        """Return whether the heater has answered unasked to `why` it is in doubt.
+
+        Not so after a bad answer: swings of the air around a sensor are brought back as well.
+        """
+        if self._distrusted_k > 0.0 or self._verdicts.lately(self._t_s):
+            return False
         since_s = self._t_s if why.since is None else why.since.t_s
         answered = hearing.unasked(self._rows, since_s, known, sd_k)
         if answered:
@@ -345,9 +350,7 @@ class HeaterWatch:
 
     def _trust(self) -> None:
         """Go on with a heater that heats; what made it doubtful is how the plant is now."""
-        cut = self._cut
-        since_s = None if cut is None or cut.began_s is None else min(cut.began_s, cut.from_s)
-        self._doubt.trust(self.known, self._rows, since_s)
+        self._doubt.trust()
         self._climb.clear()
         self._resume()
 
