@@ -3,6 +3,7 @@
 import pytest
 
 from thermoctl.regulator.heater.blocks import Block
+from thermoctl.regulator.heater.doubt import HeatDoubt
 from thermoctl.regulator.heater.response import Gain, Seen
 from thermoctl.regulator.heater.silence import Silence
 
@@ -106,3 +107,23 @@ def test_no_portion_is_enough_while_a_reading_still_comes_to_rest():
     vessel.silence.clear()
     asked = vessel.asked_after(1.0, [-0.1] * 4, again=True)
     assert asked is None
+
+
+def asked_after_falls(powers):
+    """Return after how many blocks of a steep fall, in turn under these powers, it is asked."""
+    doubt, now, sd_k = HeatDoubt(), Seen(0.0, 60.0, (0.0,) * 6), 0.5
+    doubt.begin(now._replace(t_s=-SPAN_S), now)
+    for n in range(60):
+        power = powers[n % len(powers)]
+        before, heat_s = now, now.heat_s[0] + power * SPAN_S
+        now = Seen(before.t_s + SPAN_S, before.reading_c - 0.8 * SPAN_S, (heat_s,) * 6)
+        block = Block(SPAN_S, power, now.reading_c, sd_k)
+        doubt.compare(STRONG, block, before, now, jumped=False, follow=False)
+        if doubt.silent(STRONG, now, sd_k, again=False) is not None:
+            return n + 1
+    return None
+
+
+def test_of_blocks_that_are_taken_together_for_their_noise_all_of_the_power_counts():
+    assert STRONG.mean * SPAN_S < 6.0 * 0.5 < 2.0 * STRONG.mean * SPAN_S  # two at a time
+    assert asked_after_falls([1.0, 0.2]) == asked_after_falls([0.2, 1.0]) == 8

@@ -109,16 +109,14 @@ class HeatDoubt:
         self._answered_s = 0.0
         self._cools_per_s = self._cools_loss = self._cools_s = 0.0
         self.since: Seen | None = None
-        self._begin: Seen | None = None  # of what is taken together
-        self._jumped = False
+        self._begun: tuple[Seen, Block, bool] | None = None  # of what is taken together
         self._silence = Silence()
         self.clear()
 
     def clear(self) -> None:
         """Begin the sums anew; what is known of the quiet plant stays."""
         self._missing_k = self._extra_k = self._crept_s = 0.0
-        self.since = self._begin = None
-        self._jumped = False
+        self.since = self._begun = None
         self._silence.clear()
 
     def trust(self) -> None:
@@ -239,9 +237,9 @@ class HeatDoubt:
         rise that is left by the loss, not of the heat, half may be missing. So it is where the loss
         is large, of a heater that is `proven` to obey less power.
         """
-        before, jumped = self._together(before, jumped=jumped)
+        before, block, jumped = self._together(before, block, jumped=jumped)
         if gain.mean * (now.t_s - before.t_s) < SHOWS_SDS * block.sd_k:
-            self._begin, self._jumped = before, jumped
+            self._begun = before, block, jumped
             return
         span_s, rise_k = now.t_s - before.t_s, now.reading_c - before.reading_c
         heat_k = gain.mean * (now.heat_s[gain.place] - before.heat_s[gain.place])
@@ -268,12 +266,16 @@ class HeatDoubt:
             self._need(gain, before, now)
         self._creep(gain, now.reading_c, span_s, block.sd_k)
 
-    def _together(self, before: Seen, *, jumped: bool) -> tuple[Seen, bool]:
-        """Return where what is taken together begins, and whether it jumped; forget it."""
-        if self._begin is not None:
-            before, jumped = self._begin, self._jumped or jumped
-        self._begin, self._jumped = None, False
-        return before, jumped
+    def _together(self, before: Seen, block: Block, *, jumped: bool) -> tuple[Seen, Block, bool]:
+        """Return where what is taken together begins, its block, whether it jumped; forget it."""
+        if self._begun is not None:
+            before, earlier, had_jumped = self._begun
+            jumped = jumped or had_jumped
+            span_s = earlier.span_s + block.span_s
+            given_s = earlier.span_s * earlier.power + block.span_s * block.power
+            block = block._replace(span_s=span_s, power=given_s / span_s)
+        self._begun = None
+        return before, block, jumped
 
     def _unseen(self, gain: Gain, reading_c: float) -> float:
         """Return what a loss may have grown, or has surely shrunk, by since it was learnt."""
