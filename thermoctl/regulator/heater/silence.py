@@ -119,7 +119,7 @@ class Silence:
         """
         if gain.mean < STRONG_K_PER_S:
             return None
-        since, falls, fell = self.since, self._falls, not self._rested
+        since, falls, moved = self.since, self._falls, not self._rested
         if since is None:
             return None
         from_s = now.t_s - max(BEFORE_LAGS * gain.lag_s, BEFORE_S)
@@ -131,11 +131,11 @@ class Silence:
         if not again and falls is not None and falls.t_s <= from_s and self._given_k > MUCH_K:
             why = f"expected {self._given_k:+.1f} K, got {now.reading_c - falls.reading_c:+.1f} K"
             return Cut(now.t_s, from_s, why, wild=True)
-        if (answered and not fell) or not self._lasts(gain, now, sd_k):
+        if (answered and not moved) or not self._lasts(gain, now, sd_k):
             return None
         why = f"expected {self._expected_k:+.2f} K, got {now.reading_c - self._base_c:+.2f} K"
-        began_s = None if fell else since.t_s
-        return Cut(now.t_s, max(from_s, since.t_s), why, fell and not again, began_s)
+        began_s = None if moved else since.t_s
+        return Cut(now.t_s, max(from_s, since.t_s), why, moved and not again, began_s)
 
     def fell(self, gain: Gain, sd_k: float) -> bool:
         """Return whether the reading fell as no heater makes it, and has not come back."""
@@ -145,8 +145,8 @@ class Silence:
         """Return whether nothing came of more heat than can be under way."""
         if self._expected_k <= _least_k(gain, sd_k):  # nearly always
             return False
-        rise_k, fell = now.reading_c - self._base_c, not self._rested
-        if not -(FLAT + FALLS * fell) * self._expected_k <= rise_k <= FLAT * self._expected_k:
+        rise_k, moved = now.reading_c - self._base_c, not self._rested
+        if not -(FLAT + FALLS * moved) * self._expected_k <= rise_k <= FLAT * self._expected_k:
             return False
         return self._rested or self.fell(gain, sd_k)
 
