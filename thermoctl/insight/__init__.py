@@ -4,6 +4,7 @@
 asks, in this order:
 
 - `witness`: what is the plant like, whichever controller is in charge?
+- `told_gain`: how much of its gain is fit to be told?
 - `gate`: did the last samples teach anything?
 - `rest`: is the loop at its set point, and since when? `restless`: why does it never get there?
 - `samples` keeps the last hours; `lagged_power` is the power as the sensor comes to feel it.

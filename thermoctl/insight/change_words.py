@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from thermoctl.insight import physics
 from thermoctl.insight.changes import Found
 from thermoctl.insight.drifts import Compared
@@ -20,11 +22,13 @@ def change_of(found: Found, gain: Uncertain, heater_w: float | None) -> Change:
     found : Found
         What was found.
     gain : Uncertain
-        Heating rate at full power in K/s.
+        Heating rate at full power in K/s; NaN: unknown.
     heater_w : float or None
         Rated power of the heater in W.
     """
-    capacity = None if heater_w is None else physics.capacity_j_per_k(heater_w, gain.mean)
+    capacity = None
+    if heater_w is not None and math.isfinite(gain.mean):
+        capacity = physics.capacity_j_per_k(heater_w, gain.mean)
     if found.step_k is not None and found.step_sd_k is not None:
         return _step(found, Uncertain(found.step_k, found.step_sd_k), capacity)
     slope = Uncertain(found.slope_k_per_s or 0.0, found.slope_sd_k_per_s or 0.0)

@@ -20,6 +20,7 @@ from thermoctl.insight.rest import Rest
 from thermoctl.insight.restless import Restless
 from thermoctl.insight.rows import rows
 from thermoctl.insight.samples import Samples
+from thermoctl.insight.told_gain import ToldGain, is_seen
 from thermoctl.insight.values import Change, Drift, Insight
 from thermoctl.insight.witness import Witness
 from thermoctl.quantities import Uncertain
@@ -77,6 +78,7 @@ class Insights:
         self._restless = Restless()
         self._faults = Faults()
         self._samples = Samples(period_s)
+        self._told_gain, self._gain = ToldGain(), Uncertain()
         self._known: _WatchedPlant | None = None
         self._changes: deque[Change] = deque(maxlen=CHANGES)
         self._applied, self._power = 0.0, _Turn()
@@ -133,8 +135,9 @@ class Insights:
         good = step.measurement.quality is Quality.GOOD
         reading_c = step.measurement.temperature_c if good else math.nan
         self._samples.take(step.t_s, reading_c, applied, plant.lag_s)
+        self._gain = self._told_gain.after(plant, reading_c)
         known = self._known_after(step, plant)
-        gain_k_per_s = plant.gain_k_per_s if known is None else known.gain.mean
+        gain_k_per_s = plant.gain_k_per_s if known is None else known.gain_k_per_s
         if self._performance.now.index is None and self._rest.lasts_s(step.t_s) < CALM_S:
             self._judge_unrest(step, plant.lag_s, gain_k_per_s)
         if known is None:
@@ -148,7 +151,7 @@ class Insights:
             self._found(known, step.t_s, found)
         if plant.jumped:
             self._jumped(known, step.t_s)
-        assay = known.assays.after(step.t_s, self._rest)
+        assay = known.assays.after(step.t_s, self._rest) if known.is_sound else None
         if assay is not None:
             self._assayed(known, step.t_s, assay)
         if good and self._rest.lasts_s(step.t_s) > 0.0 and not known.changes.busy:
@@ -156,13 +159,15 @@ class Insights:
 
     def _known_after(self, step: Step, plant: PlantBelief) -> _WatchedPlant | None:
         """Return what is known of the plant, which begins when the loop is first at rest."""
-        if self._known is not None and not self._known.outlived(step.t_s, plant.lag_s):
+        if self._known is not None and not self._known.outlived(step.t_s, plant, self._rest):
             return self._known
         settled_s = max(SETTLED_S, SETTLED_LAGS * plant.lag_s)
         sure = 0.0 < plant.gain_sd_k_per_s < SURE * abs(plant.gain_k_per_s)
         settled = sure and self._rest.lasts_s(step.t_s) >= settled_s
         self._known = (
-            _WatchedPlant(self._period_s, plant, self._samples, self._applied) if settled else None
+            _WatchedPlant(self._period_s, plant, self._gain, self._samples, self._applied)
+            if settled
+            else None
         )
         return self._known
 
@@ -224,10 +229,9 @@ class Insights:
         known, told = self._known, self._now.rows
         if step.t_s >= self._rows_due_s:
             self._rows_due_s = step.t_s + ROWS_S
-            gain = Uncertain(plant.gain_k_per_s, plant.gain_sd_k_per_s)
             told = rows(
                 plant,
-                gain if known is None else known.gain,
+                self._gain if known is None else known.gain,
                 None if known is None else known.slope,
                 self._given_w(),
             )
@@ -297,24 +301,49 @@ class _Turn:
 
 
 class _WatchedPlant:
-    """A plant that can be watched: its lag and gain, and who watches with them."""
+    """A plant that can be watched: its lag and gain, and who watches with them.
 
-    def __init__(self, period_s: float, plant: PlantBelief, samples: Samples, power: float) -> None:
+    `gain` is what is told of it, NaN where nothing is fit to be told; `gain_k_per_s` is what it is
+    watched with, sound or not.
+    """
+
+    def __init__(
+        self,
+        period_s: float,
+        plant: PlantBelief,
+        gain: Uncertain,
+        samples: Samples,
+        power: float,
+    ) -> None:
         self._period_s, self.lag_s = period_s, plant.lag_s
-        self.gain = Uncertain(plant.gain_k_per_s, plant.gain_sd_k_per_s)
+        self.gain, self.gain_k_per_s = gain, plant.gain_k_per_s
         self.slope: Uncertain | None = None
-        self._alike_s = math.nan
-        self.assays = AssaySchedule(self.lag_s, self.gain.mean, samples)
-        self.changes = ChangeWatch(period_s, self.lag_s, self.gain.mean, power)
+        self._alike_s, self._strays = math.nan, False
+        self.assays = AssaySchedule(self.lag_s, self.gain_k_per_s, samples)
+        self.changes = ChangeWatch(period_s, self.lag_s, self.gain_k_per_s, power)
 
-    def outlived(self, t_s: float, lag_s: float) -> bool:
-        """Return whether the plant has another lag by now, and not just for a while."""
-        if self.lag_s / LAG_MOVED <= lag_s <= self.lag_s * LAG_MOVED or math.isnan(self._alike_s):
+    @property
+    def is_sound(self) -> bool:
+        """Whether its gain is fit to be told, and the noise beside it to be learnt."""
+        return math.isfinite(self.gain.mean)
+
+    def outlived(self, t_s: float, plant: PlantBelief, rest: Rest) -> bool:
+        """Return whether the plant has another lag by now, and not just for a while.
+
+        A lag that begins to stray at rest, or that nobody can see, is that of the noise.
+        """
+        seen, alike = is_seen(plant), 1.0 / LAG_MOVED <= plant.lag_s / self.lag_s <= LAG_MOVED
+        calm = rest.lasts_s(t_s) >= max(CALM_S, CALM_LAGS * self.lag_s)
+        if seen and not calm and not self.is_sound:
+            return True
+        self._strays = seen and not alike and (self._strays or not calm)
+        if not self._strays or math.isnan(self._alike_s):
             self._alike_s = t_s
         return t_s - self._alike_s > LAG_HOLDS_S
 
     def take(self, found: Assay, power: float) -> None:
         """Take over a gain that was assayed on a move."""
         self.gain, self.slope = found.gain, found.slope or self.slope
-        if not 1.0 / GAIN_MOVED <= self.gain.mean / self.changes.gain_k_per_s <= GAIN_MOVED:
-            self.changes = ChangeWatch(self._period_s, self.lag_s, self.gain.mean, power)
+        self.gain_k_per_s = found.gain.mean
+        if not 1.0 / GAIN_MOVED <= self.gain_k_per_s / self.changes.gain_k_per_s <= GAIN_MOVED:
+            self.changes = ChangeWatch(self._period_s, self.lag_s, self.gain_k_per_s, power)
