@@ -27,6 +27,7 @@ class Filter:
     P: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
     K: np.ndarray = field(default_factory=lambda: np.zeros(4))
     S: float = 0.0
+    good: tuple[np.ndarray, float] = (np.zeros(4), 0.0)  # K and S that are kept at rest
     sure: bool = False
     knew: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
 
@@ -87,7 +88,7 @@ class Filter:
             self.K = self.P[:, 1] / self.S
             self.sure = self.P[3, 3] <= (0.1 * self.x[3]) ** 2
             self.K[3] *= e if self.sure else 1.0
-        S, K = self.S, self.K
+        K, S = self.good if steady else (self.K, self.S)
         self.x = self.x + K * nu
         if settling:
             self.grow(K[0] * nu, room=settling)
@@ -183,7 +184,7 @@ class PlainBank:
         for each in self.filters:
             each.ln_w *= tempered
         R = max(self.R_hat, 1e-5) + 2.0 * self.colour * (self.means[2] - self.means[0] ** 2)
-        S_m = likeliest.S if self.steady else likeliest.P[1, 1] + R
+        S_m = likeliest.good[1] if self.steady else likeliest.P[1, 1] + R
         if self.n - 1 >= 20 and nu_m**2 > 25 * S_m:
             self.outside += 1
         else:
@@ -242,6 +243,8 @@ class PlainBank:
             each.P[3, 3] += self.missed * max(each.P[3, 3] - each.knew[3, 3], 0.0)
             scale = np.diag([1.0, 1.0, share ** (self.missed / 2), 1.0])
             each.P, each.K = scale @ each.P @ scale, scale @ each.K
+        for each in self.filters:
+            each.good = each.K, each.S
         self.missed = self.kept = 0
         self.bound = [each.K[2] * each.S for each in self.filters]
         if before is not None:
