@@ -13,7 +13,7 @@ from thermoctl.control.adaptive import path as path_room
 from thermoctl.control.adaptive.bank import BLIND_S, Bank
 from thermoctl.control.adaptive.coasting import Outlook, power_for
 from thermoctl.control.adaptive.constants import Lags, Pace, Plants
-from thermoctl.control.adaptive.evidence import Excitation, Gate, Noise
+from thermoctl.control.adaptive.evidence import Excitation, Gate, Noise, weighted
 from thermoctl.control.adaptive.filters import BETA, D, T, X, Z
 from thermoctl.control.adaptive.hypotheses import Hypotheses
 
@@ -211,6 +211,46 @@ def test_no_evidence_about_lags_is_heard_for_five_of_them_after_a_jump():
         silent += not belief.gate.jumped
         assert silent < 1000
     assert silent == pytest.approx(5.0 * lag_s, abs=12.0)
+
+
+def with_a_rival(log_weight):
+    """Return a belief with a rival, 1 K warmer, of `log_weight`; the rival, and what it expects."""
+    belief, _ = warmed(noise_k=0.003)
+    leader = belief.weights.likeliest
+    rival, log = leader + 8, np.full(len(belief.weights.log), -30.0)
+    log[leader], log[rival] = 0.0, log_weight
+    full = belief.full.copy()
+    full[:, X, rival] = full[:, X, leader] + np.array([1.0, 1.0, 0.0, 0.0])
+    belief = belief._replace(full=full, x=full[:, X], weights=weighted(log), gains=None)
+    return belief, rival, BANK.predict(belief, 1.0).x.item(Z, rival)
+
+
+def test_a_reading_that_one_about_as_likely_foresaw_tells_the_two_apart():
+    belief, rival, y = with_a_rival(-2.0)
+    after = BANK.observe(belief, y, 1.0)
+    assert after.gate == belief.gate
+    assert after.heard > 0.0
+    assert after.weights.likeliest == rival
+
+
+def test_a_reading_that_only_the_unlikely_foresaw_is_an_outlier():
+    belief, _, y = with_a_rival(-6.0)
+    assert BANK.observe(belief, y, 1.0).gate.outside == 1
+
+
+def test_before_any_evidence_no_reading_tells_lags_apart():
+    belief, _, y = with_a_rival(-2.0)
+    equal = weighted(np.zeros(len(belief.weights.log)))
+    nobody = belief._replace(weights=equal)
+    leader, rival = (BANK.predict(nobody, 1.0).x.item(Z, j) for j in (0, belief.weights.likeliest))
+    assert abs(rival - leader) < 0.5 < abs(y - leader)
+    assert BANK.observe(nobody, y, 1.0).gate.outside == 1
+
+
+def test_while_a_disturbance_is_learnt_a_reading_tells_no_lags_apart():
+    belief, _, y = with_a_rival(-2.0)
+    learning = belief.drifting._replace(silent_until=belief.sample + 10)
+    assert BANK.observe(belief._replace(drifting=learning), y, 1.0).gate.outside == 1
 
 
 @pytest.mark.parametrize(("heater_s", "sensor_s", "shape"), [(30.0, 6.0, 1), (6.0, 30.0, 2)])

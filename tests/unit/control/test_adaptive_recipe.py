@@ -185,10 +185,10 @@ class PlainBank:
             each.ln_w *= tempered
         R = max(self.R_hat, 1e-5) + 2.0 * self.colour * (self.means[2] - self.means[0] ** 2)
         S_m = likeliest.good[1] if self.steady else likeliest.P[1, 1] + R
-        if self.n - 1 >= 20 and nu_m**2 > 25 * S_m:
-            self.outside += 1
-        else:
-            self.outside = 0
+        beyond = self.n - 1 >= 20 and nu_m**2 > 25 * S_m
+        if beyond and self.k * self.h >= self.learnt_from_s - 1e-6:
+            beyond = not self.foreseen(y, R)
+        self.outside = self.outside + 1 if beyond else 0
         if self.outside in (1, 2):
             return
         jumped = self.outside > 2
@@ -235,6 +235,16 @@ class PlainBank:
             self.missed += self.steady
         if quiet and not self.steady and (bound is None or self.kept >= 14):
             self.settle(self.filters.index(likeliest), bound)
+
+    def foreseen(self, y, R):
+        """Tell whether the likeliest, were `y` to count in full, was within five deviations."""
+        told = []
+        for each in self.filters:
+            S = each.good[1] if self.steady else each.P[1, 1] + R
+            nis = (y - each.x[1]) ** 2 / S
+            told.append((each.ln_w - 0.5 * (math.log(S) + min(nis, 9)), nis))
+        heard = any(each.ln_w < 0 for each in self.filters)
+        return heard and max(told, key=lambda one: one[0])[1] <= 25
 
     def settle(self, m, before):
         """See whether the gains have come to stand; if so, they are good for fourteen samples."""

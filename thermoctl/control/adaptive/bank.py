@@ -283,7 +283,7 @@ class Bank:
             surprise_k = y_c - float(belief.weights.share.dot(x[Z]))
         still = self._still(share, ahead.unrest)
         S_m = block.item(Z, Z, m) + noise.believed if gains is None else gains.S.item(m)
-        gate = self._gated(belief, nu, S_m)
+        gate = self._gated(belief, ahead, y_c, weights, noise.believed, nu * nu / S_m)
         if gate.outlier:
             return Correction(noise, gate, weights, drifting, 0.0, surprise_k, block, x)
         if sample >= drifting.silent_until:
@@ -351,12 +351,27 @@ class Bank:
             silent_until = belief.sample + 1 + self.hearing.hold_lags * self._lag(belief)
         return block, Drifting(silent_until=silent_until, disturbed=True), None
 
-    def _gated(self, belief: BankBelief, nu: float, S_m: float) -> Gate:
-        """Return the gate after a reading that the likeliest missed by `nu`."""
-        if belief.noise.samples >= GATE_SAMPLES and nu * nu > self.hearing.gate_sds**2 * S_m:
-            hold = self.hearing.hold_lags * self._lag(belief)
-            return belief.gate.beyond(belief.sample + 1, hold)
-        return belief.gate.within()
+    def _gated(
+        self,
+        belief: BankBelief,
+        ahead: Prediction,
+        y_c: float,
+        weights: Weights,
+        R: float,
+        nis_m: float,
+    ) -> Gate:
+        """Return the gate after `y_c`, by which the likeliest is surprised by `nis_m`.
+
+        Where one about as likely foresaw it the reading is no outlier, but tells them apart; not
+        while a disturbance is learnt, when nothing does.
+        """
+        most, sample = self.hearing.gate_sds, belief.sample + 1
+        if belief.noise.samples < GATE_SAMPLES or nis_m <= most**2:
+            return belief.gate.within()
+        settled = sample >= belief.drifting.silent_until
+        if settled and likelihood.foreseen(weights, ahead, y_c, R, most):
+            return belief.gate.within()
+        return belief.gate.beyond(sample, self.hearing.hold_lags * self._lag(belief))
 
     def _lag(self, belief: BankBelief) -> float:
         """Return the lag of the likeliest hypothesis, in samples."""
