@@ -10,6 +10,7 @@ the reading does. `check` has its settings; `led` watches a block that another l
 - `doubt` holds readings against that model, `climb` against the last rise, `ceiling` knows the
   temperature that a plant does not pass, and `silence` adds up heat that nothing follows. `trial`
   gives an unknown heater its time to show a rise.
+- `rising` tells which rises without power prove that it is stuck on.
 - `cut` is a question that is being put, `question` the regression that reads the answer, `evidence`
   weighs loads against faults, `balance` knows what a plant loses under one, `fall` a fall that no
   heater makes, and `hearing` says when an answer is believed. What a bad one leads to is in

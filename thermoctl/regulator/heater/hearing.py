@@ -14,6 +14,7 @@ from thermoctl.regulator.heater.cut import Cut
 from thermoctl.regulator.heater.known import OFF_LAGS
 from thermoctl.regulator.heater.question import Answer
 from thermoctl.regulator.heater.response import Gain, Seen
+from thermoctl.regulator.heater.rising import RISES
 
 HEARD_S, HEARD_LAGS = 20.0, 0.5
 """Time after the cut from which on a good answer is believed: in s of an unknown heater, in lags of
@@ -67,6 +68,8 @@ def answer(
         unsure = cut.portion and found in (Answer.OPEN, Answer.LATE)
         if unsure and _nothing_came(rows, cut, known, sd_k):
             found = Answer.NOTHING
+        if found is Answer.HEATS and _still_rises(rows, cut, known, sd_k):
+            found = Answer.OPEN
         return (Answer.OPEN if found is Answer.LATE else found), shown
     if found is Answer.HEATS and not late:
         return found, shown
@@ -82,10 +85,11 @@ def unasked(rows: Collection[Seen], since_s: float, known: Gain, sd_k: float) ->
     return back and evidence.odds(rows, from_s, known, sd_k) > evidence.SOUND
 
 
-def rising(rows: Collection[Seen], known: Gain, now: Seen, off_s: float, sd_k: float) -> float:
-    """Return how fast the reading has surely risen without power, in K/s."""
-    from_s = now.t_s - min(max(OFF_LAGS * known.lag_s, question.BEFORE_S), off_s)
-    return question.slope(rows, from_s, less_sd_k=sd_k)
+def _still_rises(rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float) -> bool:
+    """Return whether the reading goes on rising, which no cut of a sound heater lets it do."""
+    last_s = max(row.t_s for row in rows)
+    from_s = max(cut.at_s, last_s - max(OFF_LAGS * known.lag_s, question.BEFORE_S))
+    return question.slope(rows, from_s, less_sd_k=sd_k) > RISES * known.mean
 
 
 def _nothing_came(rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float) -> bool:

@@ -12,6 +12,12 @@ a gain of the loss, and expect at rest what comes of nothing: it is forgotten, a
 that nobody knows. Only its lag is kept, for other water has the same sensor: a lag that an earlier
 run has seen, and this one finds as well, is as good as one that is recalled.
 
+What this run has learnt may be wrong as well: a heater that is hardly used, beside another one that
+warms the same plant, looks weak and quick. Full power shows it, by a rise far beyond what is known,
+and it is learnt anew. A reading that is held tells little of a lag, and that of a plant with walls
+seems to become shorter and shorter; so the lag is never much shorter than it was when it was told
+most surely.
+
 Nor is anything taken for known while it is open what was before the start: heat of before that
 still arrives makes a gain of twice the true one, behind no lag at all.
 
@@ -22,7 +28,7 @@ less power and the reading obeys. Until then heat may be under way for as long a
 
 from __future__ import annotations
 
-from thermoctl.regulator.heater.doubt import DOUBT_K, DOUBT_SDS
+from thermoctl.regulator.heater.doubt import DOUBT_K, DOUBT_SDS, EXTRA_GAINS
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
 from thermoctl.regulator.heater.trial import RISE_K, RISE_SDS
 
@@ -68,13 +74,14 @@ class KnownHeater:
         self.gain: Gain | None = None
         self.recalled = self._obeys = False
         self._most = self._outdone_k = 0.0
+        self._told_sure, self._told = 0.0, 0
         self._eased: Seen | None = None  # when less power began
         self._disowned: int | None = None  # place of the lag of a memory that is disowned
         self._lag_as_disowned = False  # whether this run finds the same
 
     def disown(self) -> None:
-        """Forget a memory of another plant, but for its lag."""
-        once = None if self.gain is None else self.gain.place
+        """Forget what is not of this plant; of a memory of another one, all but its lag."""
+        once = self.gain.place if self.gain is not None and self.recalled else None
         self.forget()
         self._disowned = once
 
@@ -121,15 +128,28 @@ class KnownHeater:
             if now.t_s < RECALLED_S or not (moved or _agree(gain, self.gain)):
                 return
             self._obeys = gain.place == self.gain.place  # another lag has not been seen by any run
-        self.gain, self.recalled = gain, False
+            self._told_sure, self._told = 0.0, 0
+        self.gain, self.recalled = self._with_lag(gain), False
+
+    def _with_lag(self, gain: Gain) -> Gain:
+        """Return `gain` with a lag at most one place shorter than the one told most surely."""
+        sure = gain.mean / gain.sd
+        if sure > self._told_sure:
+            self._told_sure, self._told = sure, gain.place
+        known, least = self.gain, self._told - 1
+        if gain.place >= least:
+            return gain
+        gain = gain._replace(place=least)
+        return known if known is not None and known == gain else gain  # while nothing is news
 
     def outdone(self, power: float, before: Seen, now: Seen, sd_k: float) -> bool:
-        """Return whether `power` does more than that of the heater remembered could."""
+        """Return whether `power` does more than that of the heater that is known could."""
         gain = self.gain
-        if gain is None or not self.recalled or power <= NEARLY_FULL:
+        if gain is None or power <= NEARLY_FULL:
             self._outdone_k = 0.0
             return False
-        most_k = OUTDONE * gain.mean * (now.t_s - before.t_s)
+        most = OUTDONE if self.recalled else EXTRA_GAINS
+        most_k = most * gain.mean * (now.t_s - before.t_s)
         self._outdone_k = max(0.0, self._outdone_k + now.reading_c - before.reading_c - most_k)
         return self._outdone_k > max(DOUBT_K, DOUBT_SDS * sd_k)
 
@@ -188,6 +208,11 @@ class KnownHeater:
     def over_s(self) -> float:
         """How long after the power a rise is none of its heat."""
         return self.under_way_s + self._lag_or_next_s
+
+    @property
+    def surest_lag_s(self) -> float:
+        """The lag that was told most surely; the longest, unknown."""
+        return LAGS_S[-1] if self.gain is None else LAGS_S[max(self.gain.place, self._told)]
 
     @property
     def _lag_or_next_s(self) -> float:

@@ -236,18 +236,25 @@ class HeatResponse:
         squares = self._paths[self.gain.place].squares
         return abs(self.gain.mean) * math.sqrt(squares / self._blocks)
 
-    def _learn_anew(self) -> None:
-        """Go on as if heat had come for long as it was given since the start."""
+    def forget(self) -> None:
+        """Forget what was learnt; where heat and reading are stays."""
         for path in self._paths:
             path.squares = path.products = path.along = 0.0
+        self._total.squares = self._total.products = 0.0
+        self._squares = self._blocks = self._variance = 0.0
+        self.gain = None
+
+    def _learn_anew(self) -> None:
+        """Go on as if heat had come for long as it was given since the start."""
+        self.forget()
+        for path in self._paths:
             path.first = path.second = path.slope = self._start.power
             path.stand()
-        self._total.squares = self._total.products = 0.0
         self._total.begin_again(self._last_c)
-        self._squares = self._blocks = self._variance = self._moving_s = 0.0
+        self._moving_s = 0.0
         self._line_c, self._slope = self._last_c, self._start.rate / self._span_s
         self._mean_power, self._start = self._start.power, FirstReadings(Past.NOTHING)
-        self.gain, self.retracted = None, True
+        self.retracted = True
 
     def _arrive(self, span_s: float, power: float) -> None:
         """Let `span_s` of `power` go through every lag."""

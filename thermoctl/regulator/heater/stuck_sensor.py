@@ -48,6 +48,10 @@ class StuckSensor:
         """How many readings in a row have equalled the one before."""
         return self._run
 
+    def told(self) -> str:
+        """Return what was expected, and what came."""
+        return f"expected readings that differ, got {self.run + 1} equal ones in a row"
+
     def _learn(self, turned: bool) -> None:
         """Learn from a reading that moved, and from the equal ones before it."""
         count = self._run + 1

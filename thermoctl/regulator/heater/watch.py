@@ -21,6 +21,7 @@ from thermoctl.regulator.heater.doubt import HeatDoubt
 from thermoctl.regulator.heater.known import KnownHeater, arrived
 from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S, CREPT_LAGS, Answer
 from thermoctl.regulator.heater.response import Gain, HeatResponse, Seen
+from thermoctl.regulator.heater.rising import RISES, rising
 from thermoctl.regulator.heater.stuck_sensor import StuckSensor
 from thermoctl.regulator.heater.trial import Trial
 from thermoctl.regulator.heater.verdicts import Verdicts
@@ -28,9 +29,6 @@ from thermoctl.regulator.supervisor import Emit
 
 OFF = 0.01
 """Power below which the output counts as off."""
-RISES = 0.3
-"""If, at power 0, the reading rises at more than this share of the full-power rate, the heater is
-stuck on."""
 ROWS = 450
 """Number of blocks that are remembered: half an hour at a period of 1 s."""
 
@@ -104,8 +102,7 @@ class HeaterWatch:
             self._trial.begin(self._t_s)
             return
         if self._stuck.observe(reading_c):
-            text = f"expected readings that differ, got {self._stuck.run + 1} equal ones in a row"
-            self._supervisor.fail("sensor.stuck", 4, text, t_s)
+            self._supervisor.fail("sensor.stuck", 4, self._stuck.told(), t_s)
         block = self._blocks.add(interval_s, reading_c, applied)
         if block is not None:
             self._evaluate(block, t_s)
@@ -164,7 +161,7 @@ class HeaterWatch:
         if before is not None:
             self._follow_climb(block, before, now)
             outdone = self._heater.outdone(block.power, before, now, sd_k)
-            if outdone and not self._response.jumped:
+            if outdone and not self._response.jumped and (trusted or self._heater.recalled):
                 self._disown(now)
         if self._cut is None and not self._heater.seen:
             self._try_out(block, now)
@@ -182,7 +179,9 @@ class HeaterWatch:
         self._trust()
 
     def _disown(self, now: Seen) -> None:
-        """Go on with a heater that nobody knows: what was remembered is of another plant."""
+        """Go on with a heater that nobody knows: what was known is not of this plant."""
+        if self._heater.seen:
+            self._response.forget()
         self._heater.disown()
         self._ceiling.clear()
         self._doubt, self._distrusted_k = HeatDoubt(), 0.0
@@ -203,8 +202,7 @@ class HeaterWatch:
 
     def _try_out(self, block: Block, now: Seen) -> None:
         """Let an unknown heater show a rise; ask it when it has had its heat."""
-        why = self._trial.fails(self._heater.counts(block.power), block, now)
-        if why:
+        if why := self._trial.fails(self._heater.counts(block.power), block, now):
             self._ask(Cut(now.t_s, self._trial.from_s, why))
 
     def _compare(self, known: Gain, block: Block, before: Seen, now: Seen, t_s: float) -> None:
@@ -224,9 +222,7 @@ class HeaterWatch:
         hot = doubt.hot(known, sd_k) and self._heater.seen  # less water is no fault
         silent = doubt.silent(known, now, sd_k, again=again)
         if hot and self._off_s >= self._heater.under_way_s:
-            rate = hearing.rising(self._rows, known, now, self._off_s, sd_k)
-            if rate > 0.0:  # nothing is proven while too few readings show a slope
-                self._fail("heater.stuck_on", question.told_of(rate), t_s)
+            self._latch_if_rises(known, now, sd_k, t_s)
         elif not (silent or hot or block.power < OFF) and doubt.creeps(known, sd_k, again=again):
             self._ask_of_creep(known, now, sd_k)
         elif hot or ((silent or doubt.cold(known, sd_k, again=True)) and block.power >= OFF):
@@ -328,13 +324,17 @@ class HeaterWatch:
 
     def _latch_if_heated(self, known: Gain, now: Seen, sd_k: float, t_s: float) -> bool:
         """Return whether the reading has risen long after the power went, and latch that."""
-        if self._off_s <= self._heater.over_s:
-            return False
-        rate = hearing.rising(self._rows, known, now, self._off_s, sd_k)
-        heated = rate > RISES * known.mean
-        if heated:
+        late = self._off_s > self._heater.over_s
+        return late and self._latch_if_rises(known, now, sd_k, t_s, RISES * known.mean)
+
+    def _latch_if_rises(
+        self, known: Gain, now: Seen, sd_k: float, t_s: float, least: float = 0.0
+    ) -> bool:
+        """Return whether it rises by more than `least` in K/s without power, and latch that."""
+        rate = rising(self._rows, self._heater, now, self._off_s, sd_k, self._doubt.loss(known))
+        if rate > least:
             self._fail("heater.stuck_on", question.told_of(rate), t_s)
-        return heated
+        return rate > least
 
     def _accept(self, shown: Gain, asked_s: float) -> None:
         """Go on with a heater that heats, and with the gain it has shown if that is news."""
