@@ -1,4 +1,4 @@
-"""A reading that rises without power: which rises prove that a heater is stuck on.
+"""Which rises of a reading without power prove that a heater is stuck on.
 
 None does that a load explains. A door lets the air of an oven out in seconds. Once it is shut,
 walls and racks warm what came in, with or without power: as long as the reading is below where it
