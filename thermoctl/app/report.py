@@ -36,9 +36,9 @@ class Summary:
         self._travel = 0.0
         self._power: float | None = None
         self._ended: dict[str, Step] = {}
-        self._begin("", 0.0)
+        self._begin(0.0)
 
-    def _begin(self, loop: str, t_s: float) -> None:
+    def _begin(self, t_s: float) -> None:
         self._start_s = t_s
         self._rising: bool | None = None
         self._overshoot_k = 0.0
@@ -58,7 +58,7 @@ class Summary:
         elif cycle.loop != self._first.loop:
             return
         if self._last is None or step.setpoint_c != self._last.step.setpoint_c:
-            self._begin(cycle.loop, step.t_s)
+            self._begin(step.t_s)
         self._last = cycle
         self._steps += 1
         if math.isfinite(cycle.accepted_power):
