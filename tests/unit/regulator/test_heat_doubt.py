@@ -80,3 +80,36 @@ def test_how_a_plant_cooled_is_remembered_when_a_gain_is_learnt_from_an_output_t
         if doubt.hot(known, SD_K):
             hot_after_s = min(hot_after_s, second - 100.0)
     assert hot_after_s < 60.0
+
+
+class Fallen:
+    """Held at 180 degC by 45 % of power, risen from 22 degC; its reading falls into that air.
+
+    Until it was asked, or for 400 s, `asked_after_s` of full power are given.
+    """
+
+    def __init__(self, start_c):
+        self.doubt, self.now = HeatDoubt(), Seen(0.0, start_c, (0.0,) * 6)
+        self.asked_after_s = math.inf
+        rising = round((180.0 - start_c) / (0.5 * SPAN_S))
+        for power, rate, blocks in ((1.0, 0.5, rising), (0.45, 0.0, 150)):
+            self.see(power, rate, blocks, follow=rate == 0.0)
+        self.see(0.0, -7.9, 5)
+        for block in range(100):
+            self.see(1.0, 0.0, 1)
+            if self.doubt.silent(GAIN, self.now, SD_K, again=False) is not None:
+                self.asked_after_s = (block + 1) * SPAN_S
+                return
+
+    def see(self, power, rate, blocks, *, follow=False):
+        for _ in range(blocks):
+            before, heat_s = self.now, self.now.heat_s[0] + power * SPAN_S
+            reading_c = before.reading_c + rate * SPAN_S
+            self.now = Seen(before.t_s + SPAN_S, reading_c, (heat_s,) * 6)
+            met = Block(SPAN_S, power, reading_c, SD_K)
+            self.doubt.compare(GAIN, met, before, self.now, jumped=False, follow=follow)
+
+
+@pytest.mark.parametrize("start_c", [22.0, 180.0])
+def test_what_a_plant_loses_where_it_is_hot_explains_no_silence_where_it_was_coldest(start_c):
+    assert Fallen(start_c).asked_after_s <= 32.0
