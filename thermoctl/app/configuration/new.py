@@ -25,6 +25,9 @@ from thermoctl.errors import ConfigError, Refused
 from thermoctl.quantities import WATER_J_PER_L_K
 
 _USUAL_TRIP_K, _LEAST_TRIP_K = 20.0, 2.0  # how far a trip that nobody named is from the set point
+_WEAKEST_SHARE, _WEAKEST_K_PER_S = 0.2, (1e-6, 0.5)
+"""Share of the rise by litres and watts that a sound plant makes at least, for vessel, losses and
+what was misjudged; and which rises can be told, in K/s."""
 _NEAR_BOILING_C, _BOILING_C = 95.0, 100.0
 _CURVES = list(SensorTable.model_json_schema()["properties"]["curve"]["enum"])
 _RESISTIVE = ("pt100", "pt1000", "ntc")
@@ -72,6 +75,13 @@ class Answers:
     def gain_k_per_s(self) -> float:
         """Heating rate at full power, in K/s."""
         return self.heater_w / (WATER_J_PER_L_K * self.volume_l)
+
+    @property
+    def weakest_k_per_s(self) -> float | None:
+        """Least of it that a sound plant makes, in K/s; None where that can not be told."""
+        weakest = float(f"{_WEAKEST_SHARE * self.gain_k_per_s:.2g}")
+        least, most = _WEAKEST_K_PER_S
+        return weakest if least <= weakest <= most else None
 
     @property
     def setpoint_max_c(self) -> float:
@@ -223,6 +233,7 @@ def commented(answers: Answers) -> str:
             *_board_lines(answers),
             "",
             *_loop_lines(answers),
+            *_check_lines(answers),
             *_service_lines(answers),
             "",
         )
@@ -289,6 +300,14 @@ def _trip_below_lines(answers: Answers) -> list[str]:
     )
     coldest_c, _ = reach_c(sensor_for(table))
     return [_line("trip_below_c", trip_below_c, "and below this")] * (trip_below_c > coldest_c)
+
+
+def _check_lines(answers: Answers) -> list[str]:
+    if answers.weakest_k_per_s is None:
+        return []
+    why = "a fifth of gain_k_per_s; less is a fault"
+    weakest = _line("weakest_k_per_s", answers.weakest_k_per_s, why)
+    return ["", "[loops.tank.heater_check]", weakest]
 
 
 def _service_lines(answers: Answers) -> list[str]:

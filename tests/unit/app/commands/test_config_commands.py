@@ -292,6 +292,20 @@ def test_a_new_configuration_has_the_gain_of_the_heater_and_the_water(run):
     assert loop.model.gain_k_per_s == pytest.approx(2000 / (4186 * 20), rel=5e-3)
 
 
+@pytest.mark.parametrize(
+    ("heater_w", "volume_l", "weakest"),
+    [(1500, 8, 9e-3), (3000, 500, 2.9e-4), (5000, 0.2, None), (0.5, 500, None)],
+)
+def test_a_new_configuration_says_how_weak_a_healthy_heater_may_be(
+    run, heater_w, volume_l, weakest
+):
+    options = ("--heater-w", heater_w, "--volume-l", volume_l, "--kind", "null")
+    code, out, _ = run("config", "new", "--yes", *options, "--accept-no-dead-man")
+    assert code == 0
+    check = load(tomllib.loads(out)).loops["tank"].heater_check
+    assert check.weakest_k_per_s == (weakest and pytest.approx(weakest))
+
+
 def test_the_answers_of_a_person_become_the_configuration():
     answers = "thermodaq\n/dev/ttyACM3\nntc\n4700\n12\n1000\n65\n80\noff\nn\n"
     result = CliRunner().invoke(cli, ["config", "new"], input=answers)
