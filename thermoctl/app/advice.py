@@ -15,7 +15,8 @@ ADVICE: Final[Mapping[str, str]] = {
     "heater.no_response": "the water does not get warmer when it should: is the heater on, plugged "
     "in and whole, and does the sensor hang in this tank?",
     "heater.reversed": "the water gets colder when it should get warmer: is the output wired the "
-    "wrong way round, or is it a cooler, or a sensor of another tank?",
+    "wrong way round, or is it a cooler, or a sensor of another tank? Where heat takes more than "
+    "half a minute to the sensor, first_heat_s has to be twice as long",
     "heater.stuck_on": "the water gets warmer although the heater is commanded off: pull its plug "
     "now; its relay or triac may be welded",
     "output.nan": "the control law asked for no number: the journal tells which one",
