@@ -172,12 +172,12 @@ def test_the_weakest_heater_is_not_condemned_for_the_noise_of_a_burst(lag_s):
         assert set(plant.names()) <= {"heater.questioned", "heater.answered"}, seed
 
 
-def in_air(plant, seed):
-    """Return `plant` with its sensor in air that wanders by .05 K, within three minutes or so."""
+def in_air(plant, seed, wanders_k=0.05):
+    """Return `plant` with its sensor in air that wanders by that, within three minutes or so."""
     rng, off_k = np.random.default_rng(seed), deque([0.0], maxlen=1)
 
     def shows(_):
-        off_k.append(0.995 * off_k[0] + 0.005 * rng.standard_normal())
+        off_k.append(0.995 * off_k[0] + 0.1 * wanders_k * rng.standard_normal())
         return 22.0 + off_k[0]
 
     plant.shows = shows
@@ -190,6 +190,28 @@ def test_air_that_wanders_seldom_answers_for_a_heater_whose_sensor_hangs_in_it()
     given_s = [sum(plant.run(1, 1.0).applied for _ in range(3600)) for plant in plants]
     assert sorted(given_s)[6] < 400.0
     assert [plant.watch.known for plant in plants].count(None) >= 7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wanders_k", [0.05, 0.1, 0.2])
+def test_air_that_wanders_ends_in_a_fault_before_a_strong_heater_does_harm(wanders_k):
+    """However often it answers: all the heat there was has to show somewhere."""
+    for seed in range(6):
+        plant = in_air(Plant(weakest_k_per_s=9e-3, seed=seed), seed, wanders_k)
+        given_s = sum(plant.run(1, 1.0).applied for _ in range(7200))
+        assert given_s < 500.0, seed
+        assert plant.supervisor.rule(plant.t_s, 0.0) is State.LATCHED, seed
+
+
+def test_what_the_air_has_shown_is_not_held_against_a_sensor_that_is_put_back():
+    plant = in_air(Plant(weakest_k_per_s=9e-3, seed=3), 3).run(1800, 1.0)
+    assert plant.supervisor.rule(plant.t_s, 0.0) is State.LATCHED
+    plant.supervisor.acknowledge(None)
+    plant.shows, plant.water_c = lambda water_c: water_c, 22.0
+    plant.events.clear()
+    plant.run(600, 1.0)
+    assert plant.names() == []
+    assert plant.watch.known is not None
 
 
 def test_a_gain_below_that_of_the_weakest_plant_is_no_answer():

@@ -26,6 +26,7 @@ import math
 
 from thermoctl.quantities import clamp
 from thermoctl.regulator.heater.blocks import Block
+from thermoctl.regulator.heater.cut import Cut
 from thermoctl.regulator.heater.doubt import (
     CALM,
     CALM_SDS,
@@ -35,6 +36,7 @@ from thermoctl.regulator.heater.doubt import (
     HALF,
     SURE_SHARE,
 )
+from thermoctl.regulator.heater.question import BEFORE_LAGS
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
 
 STRETCH_S, STRETCH_K, STRETCH_SDS = 8.0, 0.1, 6.0
@@ -135,7 +137,12 @@ class Climb:
         """Return whether the reading does not rise as it did under the same power."""
         return self._missing_k > DOUBT_K and self._missing_k > self._limit_k(sd_k)
 
-    def told(self, now: Seen) -> str:
+    def question(self, known: Gain | None, now: Seen) -> Cut:
+        """Return the question why it has stalled."""
+        lag_s = 0.0 if known is None else known.lag_s
+        return Cut(now.t_s, now.t_s - max(BEFORE_LAGS * lag_s, STALLED_S), self._told(now))
+
+    def _told(self, now: Seen) -> str:
         """Return what was expected since the climb began to be missing, and what came."""
         since = self.since
         if since is None or not now.t_s > since.t_s:

@@ -25,9 +25,23 @@ QUIET_LAGS = 3.0
 """Time in lags after which a heater that has given a little heat is late with its answer."""
 RISES_SDS = 5.0
 """Standard deviations of a reading by which it has risen."""
+SHOWS = "{:.0f} s without power show a gain of {:.2g} K/s"
 LIKELY = "{:.0f} s without power do not show it surely, but a gain of {:.2g} K/s is likely"
 LOAD = "after {:.0f} s without power a load explains why more was needed, a dead heater does not"
 HIDDEN = "{:.0f} s without power show less than a load that comes and goes may hide"
+
+
+def told(shown: Gain, asked_s: float, *, known: Gain | None) -> str:
+    """Return what a good answer says; one that is what was `known` owes it to a load."""
+    if shown is known:
+        return LOAD.format(asked_s)
+    return SHOWS.format(asked_s, shown.mean)
+
+
+def refused(shown: Gain, asked_s: float, *, known: Gain | None) -> str:
+    """Return what a bad answer says, next to what is `known`."""
+    instead = "" if known is None else f" instead of {known.mean:.3g}"
+    return SHOWS.format(asked_s, shown.mean) + instead
 
 
 def believed_s(known: Gain | None, lag_s: float) -> tuple[float, float]:

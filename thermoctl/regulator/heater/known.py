@@ -29,8 +29,7 @@ less power and the reading obeys. Until then heat may be under way for as long a
 from __future__ import annotations
 
 from thermoctl.regulator.heater.doubt import DOUBT_K, DOUBT_SDS, EXTRA_GAINS
-from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
-from thermoctl.regulator.heater.trial import RISE_K, RISE_SDS
+from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen, clear_k
 
 SURE = 5.0
 """Standard deviations from 0 beyond which a gain is known."""
@@ -124,7 +123,7 @@ class KnownHeater:
         if not arrived(gain, now):
             return
         if self.recalled and self.gain is not None:
-            moved = moved_k > max(RISE_K, RISE_SDS * sd_k)
+            moved = moved_k > clear_k(sd_k)
             if now.t_s < RECALLED_S or not (moved or _agree(gain, self.gain)):
                 return
             self._obeys = gain.place == self.gain.place  # another lag has not been seen by any run

@@ -41,6 +41,8 @@ TREND_S = 100.0
 """Time constant in s of the fading straight line."""
 MEMORY_S = 1500.0
 """Time constant in s of the regression, counted while power moves."""
+RISE_K, RISE_SDS = 0.1, 6.0
+"""A rise counts beyond both, in K and in standard deviations of a reading."""
 MEAN_S = 50.0
 """Time constant in s of the mean power, from which a move is told."""
 ALIKE, ALIKE_S = 4.0, 6.0
@@ -92,6 +94,11 @@ class Seen(NamedTuple):
     t_s: float
     reading_c: float
     heat_s: Heat
+
+
+def clear_k(sd_k: float) -> float:
+    """Return the least rise in K that counts; `sd_k` is the noise of a reading."""
+    return max(RISE_K, RISE_SDS * sd_k)
 
 
 class _Path:

@@ -11,15 +11,15 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from thermoctl.regulator.heater import ceiling, climb, evidence, fall, hearing, question, trial
+from thermoctl.regulator.heater import ceiling, climb, evidence, fall, hearing, question
 from thermoctl.regulator.heater.blocks import Block, Blocks
 from thermoctl.regulator.heater.ceiling import Ceiling
 from thermoctl.regulator.heater.check import HeaterCheck, Reacts
 from thermoctl.regulator.heater.climb import Climb
 from thermoctl.regulator.heater.cut import Cut
 from thermoctl.regulator.heater.doubt import HeatDoubt
-from thermoctl.regulator.heater.known import KnownHeater, arrived
-from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S, CREPT_LAGS, Answer
+from thermoctl.regulator.heater.known import KnownHeater
+from thermoctl.regulator.heater.question import BEFORE_S, CREPT_LAGS, Answer
 from thermoctl.regulator.heater.response import Gain, HeatResponse, Seen
 from thermoctl.regulator.heater.rising import RISES, rising
 from thermoctl.regulator.heater.stuck_sensor import StuckSensor
@@ -49,7 +49,6 @@ class HeaterWatch:
     """
 
     def __init__(self, check: HeaterCheck, period_s: float, supervisor: Reacts, emit: Emit) -> None:
-        self._weakest = check.weakest_k_per_s
         self._unknown_s = max(60.0, 10.0 * period_s)
         self._sign = 1.0 if check.action == "heat" else -1.0
         self._blocks = Blocks(period_s, self._sign)
@@ -62,7 +61,6 @@ class HeaterWatch:
         self._cut: Cut | None = None
         self._t_s = self._off_s = 0.0
         self._verdicts = Verdicts(supervisor)
-        self._refused_c = -math.inf  # readings above it teach again
         self._distrusted_k = 0.0  # heat that must be answered before anything is learnt again
 
     @property
@@ -147,6 +145,7 @@ class HeaterWatch:
         self._rows.append(now)
         if known is not None and self._ceiling.found(self._rows, known, now, sd_k):
             self._withdraw()
+        self._trial.account.add(block.power, before, now, there=there)
         if self._cut is not None:
             self._look_for_answer(self._cut, block, now, t_s)
             return
@@ -154,7 +153,7 @@ class HeaterWatch:
             self._climb.pause()
             self._doubt.clear()
             return
-        if learns and (self.known is not None or now.reading_c > self._refused_c):
+        if learns and (self.known is not None or now.reading_c > self._trial.refused_c):
             if self._response.ripe:
                 self._heater.learn(self._response.gain, now, self._response.moved_k, sd_k)
             self._heater.follow(block.power, now)
@@ -164,7 +163,7 @@ class HeaterWatch:
             if outdone and not self._response.jumped and (trusted or self._heater.recalled):
                 self._disown(now)
         if self._cut is None and not self._heater.seen:
-            self._try_out(block, now)
+            self._ask(self._trial.question(self._heater.counts(block.power), block, now))
         known, settled = self._heater.gain, self._t_s >= self._settled_s
         if known is not None and settled and self._cut is None and before is not None:
             self._compare(known, block, before, now, t_s)
@@ -178,14 +177,28 @@ class HeaterWatch:
         self._distrusted_k = 0.0
         self._trust()
 
-    def _disown(self, now: Seen) -> None:
+    def _disown(self, now: Seen, ask: Cut | None = None) -> None:
         """Go on with a heater that nobody knows: what was known is not of this plant."""
         if self._heater.seen:
             self._response.forget()
         self._heater.disown()
         self._ceiling.clear()
         self._doubt, self._distrusted_k = HeatDoubt(), 0.0
-        self._trial.begin(now.t_s)
+        self._trial.settle(now.t_s)
+        self._ask(ask)
+
+    def _falls_short(self, known: Gain, now: Seen, sd_k: float) -> bool:
+        """Return whether more heat has not borne out what is known, and ask again: it was air."""
+        held = not (self._heater.recalled or self._distrusted_k > 0.0)
+        revised = self._trial.account.revised(known, self._rows, sd_k) if held else known
+        if revised is known:
+            return False
+        self._response.forget()
+        if revised is None:
+            self._disown(now, self._trial.again(now, self._rows))
+        else:
+            self._heater.accept(revised)
+        return revised is None
 
     def _follow_climb(self, block: Block, before: Seen, now: Seen) -> None:
         """Follow a climb, of a heater that is known or not; ask it when it has stalled."""
@@ -193,23 +206,17 @@ class HeaterWatch:
         rising.observe(known, block, before, now, jumped=jumped)
         if known is None and not jumped and rising.calm(block.sd_k):
             self._doubt.begin(before, now)
-        if rising.stalled(block.sd_k) and block.power >= OFF:
-            if known is not None and self._acquits(known, rising, block.sd_k):
-                return
-            lag_s = 0.0 if known is None else known.lag_s
-            from_s = now.t_s - max(BEFORE_LAGS * lag_s, climb.STALLED_S)
-            self._ask(Cut(now.t_s, from_s, rising.told(now)))
-
-    def _try_out(self, block: Block, now: Seen) -> None:
-        """Let an unknown heater show a rise; ask it when it has had its heat."""
-        if why := self._trial.fails(self._heater.counts(block.power), block, now):
-            self._ask(Cut(now.t_s, self._trial.from_s, why))
+        stalled = rising.stalled(block.sd_k) and block.power >= OFF
+        if stalled and (known is None or not self._acquits(known, rising, block.sd_k)):
+            self._ask(rising.question(known, now))
 
     def _compare(self, known: Gain, block: Block, before: Seen, now: Seen, t_s: float) -> None:
         """Compare what a known heater should have done with what came."""
-        if not self._heater.proven and self._latch_if_heated(known, now, block.sd_k, t_s):
-            return  # one that is proven is judged by what may come late, below
         doubt, sd_k, jumped = self._doubt, block.sd_k, self._response.jumped
+        if not self._heater.proven and (
+            self._latch_if_heated(known, now, sd_k, t_s) or self._falls_short(known, now, sd_k)
+        ):
+            return  # one that is proven is judged by what may come late, below
         again = self._distrusted_k > 0.0
         follow = not again and self._climb.calm(sd_k)
         proven = self._heater.proven
@@ -222,13 +229,13 @@ class HeaterWatch:
         hot = doubt.hot(known, sd_k) and self._heater.seen  # less water is no fault
         silent = doubt.silent(known, now, sd_k, again=again)
         if hot and self._off_s >= self._heater.under_way_s:
-            self._latch_if_rises(known, now, sd_k, t_s)
+            self._latch_if_rises(known, now, sd_k, t_s, 0.0)
         elif not (silent or hot or block.power < OFF) and doubt.creeps(known, sd_k, again=again):
             self._ask_of_creep(known, now, sd_k)
         elif hot or ((silent or doubt.cold(known, sd_k, again=True)) and block.power >= OFF):
             cut = silent or doubt.question(self._rows, known, now, sd_k, hot=hot, again=again)
             weighs = cut is not None and cut.began_s is not None
-            if cut is not None and not (weighs and self._acquits(known, doubt, sd_k)):
+            if not (weighs and self._acquits(known, doubt, sd_k)):
                 self._ask(cut)
 
     def _acquits(self, known: Gain, why: HeatDoubt | Climb, sd_k: float) -> bool:
@@ -254,7 +261,9 @@ class HeaterWatch:
         from_s = now.t_s - max(CREPT_LAGS * known.lag_s, BEFORE_S)
         self._ask(Cut(now.t_s, from_s, self._doubt.told(known, now), began_s=began_s, crept=True))
 
-    def _ask(self, cut: Cut) -> None:
+    def _ask(self, cut: Cut | None) -> None:
+        if cut is None:
+            return
         self._cut = cut
         if self._heater.gain is not None:
             self._ceiling.follow(self._rows, self._heater.gain, cut.at_s)
@@ -271,8 +280,8 @@ class HeaterWatch:
         if known is not None and self._latch_if_heated(known, now, block.sd_k, t_s):
             return
         answer, shown = self._answer(cut, block.sd_k)
-        if known is None and answer is Answer.HEATS and not arrived(shown, now):
-            answer = Answer.OPEN  # what wanders in the air is as long as the longest lags
+        if known is None:
+            answer = self._trial.account.audited(answer, shown, self._rows, block.sd_k)
         heard_s, bad_s = hearing.believed_s(known, lag_s)
         if cut.quiet and hearing.tells(answer, asked_s, lag_s):
             self._tell(cut)
@@ -300,7 +309,7 @@ class HeaterWatch:
             else:
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
         elif known is None and asked_s > self._trial.listens_s(block.sd_k):
-            if self._trial.exhausted and not shown.mean > question.LIKELY * shown.sd:
+            if self._trial.over(shown, block.sd_k):
                 self._verdicts.note(self._t_s)  # asked often enough: nothing is left to be tried
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
                 return
@@ -317,7 +326,7 @@ class HeaterWatch:
         known, climbed = self._heater.gain, climb.SHOWS * self._climb.shown
         if known is not None:
             return hearing.answer(self._rows, cut, known, sd_k, sure)
-        weakest, froms_s = max(self._weakest, climbed), [cut.from_s]
+        weakest, froms_s = max(self._trial.weakest, climbed), [cut.from_s]
         if not climbed:  # what has climbed may have failed since
             froms_s += [self._trial.since_s, -math.inf]
         return question.of_unknown_rows(self._rows, froms_s, cut.at_s, weakest, sd_k)
@@ -327,24 +336,19 @@ class HeaterWatch:
         late = self._off_s > self._heater.over_s
         return late and self._latch_if_rises(known, now, sd_k, t_s, RISES * known.mean)
 
-    def _latch_if_rises(
-        self, known: Gain, now: Seen, sd_k: float, t_s: float, least: float = 0.0
-    ) -> bool:
-        """Return whether it rises by more than `least` in K/s without power, and latch that."""
+    def _latch_if_rises(self, known: Gain, now: Seen, sd_k: float, t_s: float, by: float) -> bool:
+        """Return whether it rises by more than `by` in K/s without power, and latch that."""
         rate = rising(self._rows, self._heater, now, self._off_s, sd_k, self._doubt.loss(known))
-        if rate > least:
+        if rate > by:
             self._fail("heater.stuck_on", question.told_of(rate), t_s)
-        return rate > least
+        return rate > by
 
     def _accept(self, shown: Gain, asked_s: float) -> None:
         """Go on with a heater that heats, and with the gain it has shown if that is news."""
-        text = f"{asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s"
-        if shown is self.known:  # not by the question alone
-            text = hearing.LOAD.format(asked_s)
         if self._cut is None or not self._cut.quiet:
-            self._emit("heater.answered", text=text)
+            self._emit("heater.answered", text=hearing.told(shown, asked_s, known=self.known))
         self._heater.accept(shown, more=self._cut is None or self._cut.began_s is None)
-        self._trial.begin(self._t_s)
+        self._trial.settle(self._t_s)
         self._distrusted_k = 0.0
         self._trust()
 
@@ -366,27 +370,23 @@ class HeaterWatch:
             return
         if self._heater.gain is None and not self._verdicts.lately(self._t_s):
             self._verdicts.note(self._t_s)
-            asked_c = [row.reading_c for row in self._rows if row.t_s >= cut.from_s]
-            self._refused_c = max(asked_c) + trial.RISE_K  # one that falls bends like a lag
-            self._trial.insist(self._t_s)
+            self._trial.refuse(self._t_s, self._rows, cut.from_s)
             self._resume()
             return
         code = "heater.reversed" if answer is Answer.COOLS else "heater.no_response"
-        known = "" if self.known is None else f" instead of {self.known.mean:.3g}"
-        show = f"{asked_s:.0f} s without power show a gain of {shown.mean:.2g} K/s{known}"
-        self._fail(code, f"{cut.why}; {show}", t_s)
+        self._fail(code, f"{cut.why}; {hearing.refused(shown, asked_s, known=self.known)}", t_s)
 
     def _fail(self, code: str, text: str, t_s: float) -> None:
         """Go to SAFE; to LATCHED at the second time, or where nothing can switch it off."""
         latched = self._verdicts.fail(code, text, t_s, self._t_s)
         if latched and self._heater.recalled:  # once mended, or acknowledged, it is a new one
             self._heater.forget()
-        self._suspect(self._heater.gain)
+        self._suspect(self._heater.gain, anew=latched)
 
-    def _suspect(self, known: Gain | None) -> None:
+    def _suspect(self, known: Gain | None, *, anew: bool = False) -> None:
         """Go on with a heater that has to answer to its next heat, and soon: or it is latched."""
         self._verdicts.note(self._t_s)
-        self._trial.insist(self._t_s)
+        (self._trial.begin if anew else self._trial.settle)(self._t_s)
         if known is not None:
             self._distrusted_k = 2.0 * known.stored_k
             from_s = self._t_s - max(known.lag_s, BEFORE_S)
