@@ -204,7 +204,7 @@ def test_air_that_wanders_ends_in_a_fault_before_a_strong_heater_does_harm(wande
 
 
 def test_what_the_air_has_shown_is_not_held_against_a_sensor_that_is_put_back():
-    plant = in_air(Plant(weakest_k_per_s=9e-3, seed=3), 3).run(1800, 1.0)
+    plant = in_air(Plant(gain=0.02, weakest_k_per_s=9e-3, seed=3), 3, 0.2).run(7200, 1.0)
     assert plant.supervisor.rule(plant.t_s, 0.0) is State.LATCHED
     plant.supervisor.acknowledge(None)
     plant.shows, plant.water_c = lambda water_c: water_c, 22.0
