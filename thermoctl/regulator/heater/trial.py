@@ -67,7 +67,7 @@ class Trial:
         self.settle(t_s)
 
     def settle(self, t_s: float) -> None:
-        """Begin with the first heat again after an answer, which may turn out to be none."""
+        """Begin with the first heat again; all the heat there was still counts."""
         self.since_s, self._patience_s = t_s, self._first_s
         self.resume(t_s)
 
