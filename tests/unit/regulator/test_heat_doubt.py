@@ -97,7 +97,7 @@ class Fallen:
         self.see(0.0, -7.9, 5)
         for block in range(100):
             self.see(1.0, 0.0, 1)
-            if self.doubt.silent(GAIN, self.now, SD_K, again=False) is not None:
+            if self.doubt.silent(GAIN, 6e-5, self.now, SD_K, again=False) is not None:
                 self.asked_after_s = (block + 1) * SPAN_S
                 return
 

@@ -27,7 +27,9 @@ class Vessel:
             self.now = Seen(before.t_s + SPAN_S, reading_c, (heat_s,) * 6)
             met = Block(SPAN_S, power, reading_c, SD_K)
             self.silence.add(self.gain, met, before, self.now, loss * SPAN_S)
-            cut = self.silence.question(self.gain, self.now, SD_K, again=again, answered=answered)
+            cut = self.silence.question(
+                self.gain, 6e-5, self.now, SD_K, again=again, answered=answered
+            )
             if cut is not None:
                 return (block + 1) * SPAN_S, cut
         return None
@@ -119,7 +121,7 @@ def asked_after_falls(powers):
         now = Seen(before.t_s + SPAN_S, before.reading_c - 0.8 * SPAN_S, (heat_s,) * 6)
         block = Block(SPAN_S, power, now.reading_c, sd_k)
         doubt.compare(STRONG, block, before, now, jumped=False, follow=False)
-        if doubt.silent(STRONG, now, sd_k, again=False) is not None:
+        if doubt.silent(STRONG, 6e-5, now, sd_k, again=False) is not None:
             return n + 1
     return None
 

@@ -18,7 +18,8 @@ import math
 from collections.abc import Collection
 
 from thermoctl.regulator.heater import evidence
-from thermoctl.regulator.heater.known import NEARLY_FULL, arrived
+from thermoctl.regulator.heater.blocks import NEARLY_FULL
+from thermoctl.regulator.heater.known import arrived
 from thermoctl.regulator.heater.question import Answer
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen, clear_k
 

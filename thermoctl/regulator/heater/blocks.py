@@ -6,6 +6,8 @@ import math
 from typing import NamedTuple
 
 BLOCK_S = 4.0
+NEARLY_FULL = 0.9
+"""Power above which a reading has to rise, unless its plant is at what it can reach."""
 NOISE_START_K2 = 1e-3
 NOISE_MIN_K2 = 1e-6
 """Least variance of the noise in K²: 1 mK."""

@@ -183,12 +183,14 @@ class HeatDoubt:
             return False
         return self._missing_k > _limit_k(gain, sd_k, DOUBT_LAGS_AGAIN if again else DOUBT_LAGS)
 
-    def silent(self, gain: Gain, now: Seen, sd_k: float, *, again: bool) -> Cut | None:
-        """Return why to ask a strong heater of which the reading shows nothing."""
+    def silent(
+        self, gain: Gain, weakest: float, now: Seen, sd_k: float, *, again: bool
+    ) -> Cut | None:
+        """Return why to ask a heater of which the reading shows nothing."""
         if again and self.short(gain, sd_k, again=True):
             return None  # what is missing is reason enough, and says more
         answered = self._answered_s > 0.0
-        return self._silence.question(gain, now, sd_k, again=again, answered=answered)
+        return self._silence.question(gain, weakest, now, sd_k, again=again, answered=answered)
 
     def question(
         self, rows: Collection[Seen], gain: Gain, now: Seen, sd_k: float, *, hot: bool, again: bool

@@ -28,6 +28,7 @@ less power and the reading obeys. Until then heat may be under way for as long a
 
 from __future__ import annotations
 
+from thermoctl.regulator.heater.blocks import NEARLY_FULL
 from thermoctl.regulator.heater.doubt import DOUBT_K, DOUBT_SDS, EXTRA_GAINS
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen, clear_k
 
@@ -42,8 +43,6 @@ RECALLED_S = 600.0
 OUTDONE = 1.1
 """Largest rise that a remembered heater explains, as a multiple of its rise at full power: the
 mains may be high. A larger one is that of another plant, and ends the memory."""
-NEARLY_FULL = 0.9
-"""Power above which a remembered heater has to show a rise."""
 CHANGED, AT_ONCE = 0.7, 3.0
 """A gain below CHANGED of the known one replaces it, and so does one as far above it, but by no
 more than AT_ONCE times the known one at once."""

@@ -22,6 +22,7 @@ from thermoctl.regulator.heater.blocks import Block
 from thermoctl.regulator.heater.cut import Cut
 from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S
 from thermoctl.regulator.heater.response import Gain, Seen
+from thermoctl.regulator.heater.standing import Standing
 
 STRONG_K_PER_S = 0.1
 """Least gain in K/s of a heater that is meant: weaker ones are asked in time by `doubt`."""
@@ -67,6 +68,7 @@ class Silence:
 
     def __init__(self) -> None:
         self._fell_k = 0.0
+        self._standing = Standing()
         self.clear()
 
     def clear(self) -> None:
@@ -78,12 +80,14 @@ class Silence:
         self._paid_s = -math.inf
         self._falls: Seen | None = None
         self._given_k = 0.0
+        self._standing.clear()
 
     def add(self, gain: Gain, block: Block, before: Seen, now: Seen, loss_k: float) -> None:
         """Take in a block, from `before` to `now`, in which the plant loses `loss_k`."""
         span_s, rise_k = now.t_s - before.t_s, now.reading_c - before.reading_c
         heat_k = gain.mean * (now.heat_s[gain.place] - before.heat_s[gain.place])
         full_k = gain.mean * span_s
+        self._standing.add(block, before)
         self._unpaid_k += full_k * block.power - max(rise_k, 0.0) / ANSWERS
         if self._unpaid_k <= 0.0:
             self._unpaid_k, self._paid_s = 0.0, now.t_s
@@ -110,13 +114,17 @@ class Silence:
         self._expected_k += max(heat_k - LOSSES * loss_k - LEFT_SHARE * full_k, 0.0)
 
     def question(
-        self, gain: Gain, now: Seen, sd_k: float, *, again: bool, answered: bool
+        self, gain: Gain, weakest: float, now: Seen, sd_k: float, *, again: bool, answered: bool
     ) -> Cut | None:
         """Return why to cut the power now, if there is a reason.
 
         Sooner `again`, after a bad answer. What has `answered` well may stand under full power for
         the reason it was asked for, unless it has fallen since.
         """
+        if not again:
+            stands = self._standing.question(gain, weakest, now, sd_k, answered=answered)
+            if stands is not None:
+                return stands
         if gain.mean < STRONG_K_PER_S:
             return None
         since, falls, moved = self.since, self._falls, not self._rested

@@ -17,7 +17,7 @@ from thermoctl.regulator.heater.ceiling import Ceiling
 from thermoctl.regulator.heater.check import HeaterCheck, Reacts
 from thermoctl.regulator.heater.climb import Climb
 from thermoctl.regulator.heater.cut import Cut
-from thermoctl.regulator.heater.doubt import HeatDoubt
+from thermoctl.regulator.heater.doubt import DOUBT_K, HeatDoubt
 from thermoctl.regulator.heater.known import KnownHeater
 from thermoctl.regulator.heater.question import BEFORE_S, CREPT_LAGS, Answer
 from thermoctl.regulator.heater.response import Gain, HeatResponse, Seen
@@ -227,7 +227,7 @@ class HeaterWatch:
             heat_s = now.heat_s[known.place] - before.heat_s[known.place]
             self._distrusted_k -= known.mean * heat_s
         hot = doubt.hot(known, sd_k) and self._heater.seen  # less water is no fault
-        silent = doubt.silent(known, now, sd_k, again=again)
+        silent = doubt.silent(known, self._trial.weakest, now, sd_k, again=again)
         if hot and self._off_s >= self._heater.under_way_s:
             self._latch_if_rises(known, now, sd_k, t_s, 0.0)
         elif not (silent or hot or block.power < OFF) and doubt.creeps(known, sd_k, again=again):
@@ -388,7 +388,7 @@ class HeaterWatch:
         self._verdicts.note(self._t_s)
         (self._trial.begin if anew else self._trial.settle)(self._t_s)
         if known is not None:
-            self._distrusted_k = 2.0 * known.stored_k
+            self._distrusted_k = max(2.0 * known.stored_k, DOUBT_K)
             from_s = self._t_s - max(known.lag_s, BEFORE_S)
             self._doubt.distrust(known, -question.slope(self._rows, from_s))
         self._resume()

@@ -1,0 +1,141 @@
+"""A reading that stands under full power is asked, and one that is at its limit answers."""
+
+from collections import deque
+
+import numpy as np
+import pytest
+
+from thermoctl.regulator.heater.blocks import NEARLY_FULL, Block
+from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen, clear_k
+from thermoctl.regulator.heater.standing import ANSWERED_S, STANDS_K, STANDS_S, Standing
+from thermoctl.regulator.heater.watch import HeaterWatch
+from thermoctl.regulator.limits import Limits
+from thermoctl.regulator.supervisor import Supervisor
+from thermoctl.signals import Measurement, State
+
+BLOCK_S, NOISE_K, WEAKEST = 4.0, 0.005, 9e-4
+PLACES = len(LAGS_S)
+
+
+def asked_s(seconds, gain=0.04, rise_k_per_s=0.0, power=1.0, answers_s=0.0):
+    """Return when a reading that rises by so much is asked; it answers for so long after."""
+    standing, known, at_s = Standing(), Gain(gain, 0.01 * gain, 0), []
+    before = Seen(0.0, 20.0, (0.0,) * PLACES)
+    while before.t_s < seconds:
+        t_s = before.t_s + BLOCK_S
+        now = Seen(t_s, 20.0 + rise_k_per_s * t_s, (power * t_s,) * PLACES)
+        standing.add(Block(BLOCK_S, power, now.reading_c, NOISE_K), before)
+        answered = bool(at_s) and t_s - at_s[-1] < answers_s
+        if standing.question(known, WEAKEST, now, NOISE_K, answered=answered) is not None:
+            at_s.append(t_s)
+        before = now
+    return at_s
+
+
+def test_what_stands_is_asked_and_what_has_answered_is_left_alone_for_longer():
+    tardy_s = 2.0 * BLOCK_S
+    assert np.diff([0.0, *asked_s(10_000.0)]) == pytest.approx(STANDS_S, abs=tardy_s)
+    waits_s = np.diff([0.0, *asked_s(20_000.0, answers_s=100.0)])
+    assert waits_s == pytest.approx([STANDS_S, ANSWERED_S, ANSWERED_S], abs=tardy_s)
+
+
+@pytest.mark.parametrize(
+    "sound",
+    [
+        {"rise_k_per_s": 1.2 * clear_k(NOISE_K) / STANDS_S},  # it is still getting warmer
+        {"power": 0.99 * NEARLY_FULL},  # it is held
+        {"gain": 0.9 * STANDS_K / 7200.0},  # so little would not show
+    ],
+    ids=lambda keys: next(iter(keys)),
+)
+def test_nothing_is_asked_of_what_may_well_be_sound(sound):
+    assert asked_s(7200.0, **sound) == []
+
+
+def test_a_rise_beyond_where_it_answered_is_news():
+    standing, known = Standing(), Gain(0.04, 4e-4, 0)
+    stood = Seen(0.0, 20.0, (0.0,) * PLACES)
+    for risen_k, asked in ((0.0, False), (1.0, True)):
+        assert standing.question(known, WEAKEST, stood, NOISE_K, answered=True) is None
+        standing.clear()
+        for t_s, reading_c in ((0.0, 19.0), (ANSWERED_S, 20.0 + risen_k)):
+            now = Seen(t_s, reading_c, (t_s,) * PLACES)
+            standing.add(Block(BLOCK_S, 1.0, reading_c, NOISE_K), now)
+            assert standing.question(known, WEAKEST, now, NOISE_K, answered=False) is None
+        later = Seen(ANSWERED_S + STANDS_S, now.reading_c, (ANSWERED_S + STANDS_S,) * PLACES)
+        told = standing.question(known, WEAKEST, later, NOISE_K, answered=False)
+        assert (told is not None) is asked
+
+
+def test_less_power_begins_the_stretch_anew():
+    standing, known = Standing(), Gain(0.04, 4e-4, 0)
+    for t_s, power in ((0.0, 1.0), (STANDS_S - 1.0, 0.5), (STANDS_S, 1.0)):
+        before = Seen(t_s, 20.0, (t_s,) * PLACES)
+        standing.add(Block(BLOCK_S, power, 20.0, NOISE_K), before)
+    now = Seen(2.0 * STANDS_S - 1.0, 20.0, (2.0 * STANDS_S,) * PLACES)
+    assert standing.question(known, WEAKEST, now, NOISE_K, answered=False) is None
+
+
+class Vessel:
+    """A watch over what loses more the hotter it is; `shows` is what is read of it."""
+
+    def __init__(self, gain=0.02, cools_per_s=4e-4, lag_s=20.0, seed=1, **check):
+        self.gain, self.cools_per_s, self.pole_s = gain, cools_per_s, 0.5 * lag_s
+        self.events = deque()
+        self.supervisor = Supervisor(Limits(200.0, -50.0, -50.0, 200.0), self.emit)
+        self.watch = HeaterWatch(HeaterCheck(**check), 1.0, self.supervisor, self.emit)
+        self.rng, self.shows = np.random.default_rng(seed), lambda water_c: water_c
+        self.t_s, self.water_c, self.applied, self.given_s = 0.0, 20.0, 0.0, 0.0
+        self.first = self.second = 0.0
+
+    def emit(self, name, **fields):
+        self.events.append(name)
+
+    def names(self):
+        return [name for name in self.events if name.startswith("heater.")]
+
+    def run(self, seconds):
+        """Give full power wherever nobody forbids it."""
+        for _ in range(round(seconds)):
+            self.first += (self.applied - self.first) / self.pole_s
+            self.second += (self.first - self.second) / self.pole_s
+            self.water_c += self.gain * self.second - self.cools_per_s * (self.water_c - 20.0)
+            self.t_s += 1.0
+            reading_c = self.shows(self.water_c) + 0.01 * self.rng.standard_normal()
+            self.supervisor.judge(Measurement(self.t_s, reading_c), self.t_s, 1.0)
+            self.watch.observe(self.t_s, 1.0, reading_c, self.applied)
+            runs = self.supervisor.rule(self.t_s, 0.0) is State.RUN
+            self.applied = float(runs and not self.watch.asks)
+            self.given_s += self.applied
+        return self
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("gain", "cools_per_s", "lag_s"),
+    [(0.02, 4e-4, 20.0), (0.005, 2e-4, 60.0), (0.15, 4e-3, 10.0), (0.002, 2e-4, 40.0)],
+)
+def test_a_vessel_at_its_limit_answers_and_goes_on(gain, cools_per_s, lag_s):
+    vessel = Vessel(gain, cools_per_s, lag_s).run(20 * 3600)
+    assert set(vessel.names()) == {"heater.questioned", "heater.answered"}
+    assert vessel.given_s > 0.97 * vessel.t_s
+    assert vessel.supervisor.state is State.RUN
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1, 4])
+def test_air_that_warmed_like_a_heater_is_told_once_it_stands(seed):
+    """By then all the heat counts as lost, and the air wanders by a fiftieth of a kelvin."""
+    vessel, rng = Vessel(seed=seed, weakest_k_per_s=9e-4), np.random.default_rng(100 + seed)
+    off_k = deque([0.0], maxlen=1)
+
+    def shows(_):
+        off_k.append(0.995 * off_k[0] + 0.002 * rng.standard_normal())
+        return 22.0 + off_k[0] + 2e-3 * min(vessel.t_s, 3600.0)
+
+    vessel.shows = shows
+    before_s = vessel.run(3600).given_s
+    vessel.run(2 * 3600)
+    assert vessel.supervisor.state is State.LATCHED
+    assert vessel.given_s - before_s < 3600.0
