@@ -6,7 +6,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from thermoctl.app import plugins
-from thermoctl.app.configuration.tables import CascadeTable, LoopTable, Options
+from thermoctl.app.configuration.bases import Options
+from thermoctl.app.configuration.device_tables import CascadeTable
+from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.plugins import nearest
 
 BLOCK_LAGS = {"shortest_s": 1.0, "longest_s": 60.0}

@@ -17,7 +17,8 @@ from pydantic import BaseModel
 
 from thermoctl.app import plugins
 from thermoctl.app.cascades import cascade_errors
-from thermoctl.app.configuration.tables import CascadeTable, LoopTable, SensorTable
+from thermoctl.app.configuration.device_tables import CascadeTable, SensorTable
+from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.parts import law_for, plan_for, sensor_for
 from thermoctl.app.plugins import BadOption
 from thermoctl.app.settings import Settings

@@ -11,6 +11,9 @@ from thermoctl.app.parts import COOL, HEAT, action_of, plan_for
 from thermoctl.app.readings import coarse_readings
 from thermoctl.app.settings import Settings
 
+NO_HARDWARE: Final = ("null", "simulated")
+"""Kinds of boards that heat nothing."""
+
 HEADROOM_K: Final = 1.0
 """Least distance from a set point to a trip, under `adaptive` alone. That passes its set point by
 0.1 K at most on 19 of 20 tanks (``docs/compare.md``), but a reading that is off by 1 K is still
@@ -39,6 +42,9 @@ def doubts(settings: Settings) -> list[Doubt]:
     found = [Doubt("config.coarse", name, "sensor", text) for name, text in coarse]
     for name, table in settings.loops.items():
         found += [Doubt("config.narrow", name, key, text) for key, text in _narrow(table)]
+        boards = [settings.boards.get(each.board) for each in table.outputs]
+        if not all(getattr(each, "kind", "") in NO_HARDWARE for each in boards):
+            found += [Doubt("config.unstated", name, key, text) for key, text in _unstated(table)]
     return found
 
 
@@ -64,3 +70,18 @@ def _narrow(table: LoopTable) -> Iterator[tuple[str, str]]:
             text = f"expected {trip_c - sign * least_k:g}, {least_k:g} K {word} {trip}, or farther"
             yield name, f"{text}, got {got}: an overshoot there switches all off until acknowledged"
             break
+
+
+def _unstated(table: LoopTable) -> Iterator[tuple[str, str]]:
+    """Yield key and words where nothing says what a heater that is sound does at least.
+
+    Of one that nobody has seen to heat, a weak one and a sensor that hangs beside its tank look
+    alike until the heat of all that time should have shown.
+    """
+    check = table.heater_check
+    told = check.weakest_k_per_s is not None or table.volume_l is not None
+    if told or not check.enabled or action_of(plan_for(table).controller) == COOL:
+        return
+    key, got = ("heater_w", "neither") if table.heater_w is None else ("volume_l", "watts alone")
+    text = f"expected heater_w and volume_l, or weakest_k_per_s in heater_check, got {got}"
+    yield key, f"{text}: a heater dead from the start, or a sensor beside its tank, is told late"

@@ -13,15 +13,10 @@ from typing import Any
 from pydantic import BaseModel
 
 from thermoctl.app import plugins
+from thermoctl.app.configuration.bases import Options
+from thermoctl.app.configuration.device_tables import ActuatorTable, SensorTable
 from thermoctl.app.configuration.repair import repaired, without
-from thermoctl.app.configuration.tables import (
-    ActuatorTable,
-    EstimatorTable,
-    LoopTable,
-    ModelTable,
-    Options,
-    SensorTable,
-)
+from thermoctl.app.configuration.tables import EstimatorTable, LoopTable
 from thermoctl.app.plugins import BadOption
 from thermoctl.app.reach import reach_errors
 from thermoctl.estimation import Guarded, Identifier, RandomWalkKalman
@@ -49,7 +44,7 @@ def plan_for(table: LoopTable) -> Plan:
         An option of a law is unknown or bad; its path begins below the loop.
     """
     with _within("model", table.model):
-        structure = _structure(table.model, table.period_s)
+        structure = _structure(table)
     with _within("controller", table.controller):
         controller = _controller(table, table.controller, structure)
     shadow = None
@@ -83,7 +78,7 @@ def law_of_kind(table: LoopTable, kind: str) -> Controller:
     BadOption
         There is no such kind, or it does not fit the loop.
     """
-    structure = _structure(table.model, table.period_s)
+    structure = _structure(table)
     charge = _controller(table, table.controller, structure)
     configured = [each for each in (table.controller, table.shadow) if each is not None]
     chosen = next((each for each in configured if each.kind == kind), Options(kind=kind))
@@ -199,7 +194,7 @@ def _heater_check(table: LoopTable, controller: Controller) -> HeaterCheck | Non
         return None
     weakest = check.weakest_k_per_s
     if weakest is None:
-        weakest = weakest_of(table.heater_w)
+        weakest = weakest_of(table.heater_w, table.volume_l)
     action: Any = action_of(controller)  # a plug-in's may be anything, and is refused there
     leads = table.leads
     block_c = None if leads is None else (leads.low_c, leads.high_c)
@@ -237,9 +232,10 @@ def _jump_k(loop: LoopTable) -> float:
     return max(loop.jump_k, 2.0 * _gain_k(loop))
 
 
-def _structure(table: ModelTable, period_s: float) -> Arx | KnownGain:
+def _structure(loop: LoopTable) -> Arx | KnownGain:
+    table = loop.model
     if table.structure == "known-gain":
-        return KnownGain(table.gain_k_per_s * period_s)
+        return KnownGain(_gain_k(loop))
     return Arx(table.n, table.m, table.delay, y_centre_c=table.centre_c, y_scale_k=table.scale_k)
 
 
@@ -260,7 +256,7 @@ def _identifier(loop: LoopTable, structure: Arx | KnownGain, reference_time_s: f
 
 def _gain_k(loop: LoopTable) -> float:
     """Return the rise during one period at full power, in K, as it is configured."""
-    return loop.model.gain_k_per_s * loop.period_s
+    return loop.gain_k_per_s * loop.period_s
 
 
 def _first_guess(structure: Arx | KnownGain, gain_k: float) -> tuple[float, ...]:
@@ -324,7 +320,7 @@ def _controller(table: LoopTable, chosen: Options, structure: Arx | KnownGain) -
     injected = {name: value for name, value in given.items() if name in known}
     if isinstance(structure, Arx) and table.estimator.guards.enabled and "gain_min_k" in known:
         options.setdefault("gain_min_k", _ARX_GAIN_SHARE * _gain_k(table))
-    told = {"gain_k_per_s": table.model.gain_k_per_s, "power_max": table.power_max}
+    told = {"gain_k_per_s": table.gain_k_per_s, "power_max": table.power_max}
     for name in told.keys() & set(known):
         options.setdefault(name, told[name])
     controller: Controller = plugins.build(law, options, **injected)

@@ -15,6 +15,7 @@ from pydantic import BaseModel, Field, SerializeAsAny, ValidationError
 
 from thermoctl.app import plugins
 from thermoctl.app.cascades import as_blocks, cascade_errors
+from thermoctl.app.configuration.bases import Table
 from thermoctl.app.configuration.document import (
     BadConfiguration,
     Document,
@@ -26,7 +27,7 @@ from thermoctl.app.configuration.repair import (
     without_keys_beside_limits,
     without_unknown_keys,
 )
-from thermoctl.app.configuration.tables import HistoryTable, LoopTable, ServiceTable, Table
+from thermoctl.app.configuration.tables import HistoryTable, LoopTable, ServiceTable
 from thermoctl.app.configuration.toml_places import KeyPath
 from thermoctl.app.configuration.wording import (
     reasons,

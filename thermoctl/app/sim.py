@@ -9,7 +9,8 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from thermoctl.app.compose import loop_for, started_as
-from thermoctl.app.configuration.tables import ActuatorTable, LoopTable, SensorTable
+from thermoctl.app.configuration.device_tables import ActuatorTable, SensorTable
+from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.parts import COOL, action_of, plan_for
 from thermoctl.app.settings import Settings, load
 from thermoctl.errors import ConfigError
@@ -93,8 +94,8 @@ def simulate(settings: Settings, duration_s: float, seed: int | None = None) -> 
 def stand_ins(settings: Settings) -> dict[str, SimulatedSettings]:
     """Return the tank that stands in for each real board, by the name of the board.
 
-    It heats as fast as the model of the board's loop says, whatever litres and watts are behind
-    that: 1,500 W in as much water as it takes.
+    It heats as fast as the board's loop says: with its litres, or else, whatever is behind that,
+    1,500 W in as much water as it takes.
 
     Raises
     ------
@@ -116,9 +117,9 @@ def _tank_for(board: str, settings: Settings, mains_hz: float) -> SimulatedSetti
                     f"loop {loop!r} cannot be simulated: expected its heater and its cooler on one "
                     f"board, got {', '.join(each.board for each in table.outputs)}"
                 )
-            litres = _STAND_IN_W / (WATER_J_PER_L_K * table.model.gain_k_per_s)
+            litres = table.volume_l or _STAND_IN_W / (WATER_J_PER_L_K * table.gain_k_per_s)
             volume_l = clamp(litres, *_VOLUMES_L)
-            heater_w = clamp(WATER_J_PER_L_K * volume_l * table.model.gain_k_per_s, *_POWERS_W)
+            heater_w = clamp(WATER_J_PER_L_K * volume_l * table.gain_k_per_s, *_POWERS_W)
             try:
                 return SimulatedSettings(
                     volume_l=volume_l,

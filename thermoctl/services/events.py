@@ -50,6 +50,7 @@ _BY_LEVEL: Final = {
         "clock.stepped",
         "config.coarse",
         "config.narrow",
+        "config.unstated",
         "controller.gain_doubtful",
         "controller.refused",
         "controller.tuning_failed",

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from thermoctl.app.compose import loop_for, wiring_errors
+from thermoctl.app.configuration.device_tables import CascadeTable
 from thermoctl.app.configuration.document import BadConfiguration
-from thermoctl.app.configuration.tables import CascadeTable
 from thermoctl.app.cycle_record import cycle_record
 from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import load

@@ -64,6 +64,31 @@ def test_what_cools_overshoots_downwards():
     assert told(setpoint_c=12.0, setpoint_min_c=5.0, setpoint_max_c=60.0, **cool) == {}
 
 
+def board(kind: str, **keys) -> list[str]:
+    """Return the keys that are doubtful in a loop on a board of this kind."""
+    port = {"port": "/dev/null"} if kind == "thermodaq" else {}
+    loop = {"setpoint_c": 37.5, "setpoint_max_c": 55, "trip_above_c": 60, **keys}
+    loop |= {"sensor": {"board": "daq"}, "actuator": {"board": "daq"}}
+    settings = load({"boards": {"daq": {"kind": kind, **port}}, "loops": {"tank": loop}})
+    return [each.key for each in doubts(settings) if each.event == "config.unstated"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "key"),
+    [
+        ({}, ["heater_w"]),
+        ({"heater_w": 1500}, ["volume_l"]),
+        ({"heater_w": 1500, "volume_l": 8}, []),
+        ({"heater_check": {"weakest_k_per_s": 0.01}}, []),
+        ({"heater_check": {"enabled": False}}, []),
+        ({"controller": {"kind": "adaptive", "action": "cool"}}, []),
+    ],
+)
+def test_a_real_heater_is_to_be_described(keys, key):
+    assert board("thermodaq", **keys) == key
+    assert board("simulated", **keys) == board("null", **keys) == []
+
+
 @pytest.fixture
 def narrow() -> str:
     """Return the aquarium, its shadow too, with its set point next to the trip, as TOML."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from thermoctl.app.configuration.tables import SensorTable
+from thermoctl.app.configuration.device_tables import SensorTable
 from thermoctl.app.parts import sensor_for
 from thermoctl.app.reach import reach_c
 from thermoctl.app.settings import load

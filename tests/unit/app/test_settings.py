@@ -14,14 +14,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thermoctl.app.compose import regulator_for, wiring_errors
+from thermoctl.app.configuration.device_tables import ActuatorTable, SensorTable
 from thermoctl.app.configuration.document import BadConfiguration, exposures
+from thermoctl.app.configuration.in_force import in_force
 from thermoctl.app.configuration.tables import (
-    ActuatorTable,
     GuardsTable,
     HistoryTable,
     LoopTable,
     ModelTable,
-    SensorTable,
     ServiceTable,
 )
 from thermoctl.app.doubts import doubts
@@ -622,3 +622,21 @@ def test_root_does_not_obey_a_file_that_everybody_may_write_to(tmp_path):
         return
     with pytest.raises(ConfigError, match="only its owner may write to, got mode 0666"):
         load(path)
+
+
+def test_litres_and_watts_are_the_gain_of_a_model_that_is_given_none():
+    rated = {"setpoint_c": 37.5, "trip_above_c": 60.0, "heater_w": 2000.0, "volume_l": 20.0}
+    follows = load({"loops": {"tank": rated}})
+    assert follows.loops["tank"].gain_k_per_s == pytest.approx(2000.0 / (4186.0 * 20.0))
+    assert in_force(follows)["loops"]["tank"]["model"]["gain_k_per_s"] == pytest.approx(
+        0.02389, 1e-3
+    )
+    given = load({"loops": {"tank": rated | {"model": {"gain_k_per_s": 0.03}}}})
+    assert given.loops["tank"].gain_k_per_s == 0.03
+
+
+def test_litres_without_watts_say_nothing():
+    with pytest.raises(
+        ConfigError, match="heater_w: expected the watts that warm volume_l, got none"
+    ):
+        load({"loops": {"tank": {"setpoint_c": 37.5, "trip_above_c": 60.0, "volume_l": 8.0}}})

@@ -35,6 +35,13 @@ def test_a_tank_stands_in_that_heats_as_fast_as_the_model_says(gain_k_per_s):
     assert tank.heater_w / (4186.0 * tank.volume_l) == pytest.approx(gain_k_per_s, rel=0.4)
 
 
+def test_a_tank_that_stands_in_has_the_litres_and_watts_that_are_told():
+    content = configured().in_force()
+    content["loops"]["tank"] |= {"heater_w": 2000.0, "volume_l": 20.0, "model": {}}
+    tank = stand_ins(load(content))["daq"]
+    assert (tank.volume_l, tank.heater_w) == (20.0, pytest.approx(2000.0))
+
+
 @pytest.mark.parametrize("curve", ["lm335", "pt100", "ntc"])
 @pytest.mark.slow
 def test_a_tank_that_stands_in_is_held_whatever_sensor_the_real_one_has(curve):

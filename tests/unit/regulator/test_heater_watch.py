@@ -236,12 +236,19 @@ def test_a_rated_heater_is_no_weaker_than_in_the_largest_vessel():
 
 @pytest.mark.parametrize(
     ("said", "weakest"),
-    [({}, 6e-5), ({"heater_w": 2093.0}, 1.25e-3), ({"heater_w": 2093.0, "check": 0.01}, 0.01)],
+    [
+        ({}, 6e-5),
+        ({"heater_w": 2093.0}, 1.25e-3),
+        ({"heater_w": 2093.0, "volume_l": 10.0}, 0.01),
+        ({"heater_w": 2093.0, "volume_l": 2000.0}, 5e-5),
+        ({"heater_w": 0.1, "volume_l": 2000.0}, 1e-6),
+        ({"heater_w": 9e9, "volume_l": 0.01}, 0.5),
+        ({"heater_w": 2093.0, "heater_check": {"weakest_k_per_s": 0.02}}, 0.02),
+        ({"heater_w": 1.0, "volume_l": 1.0, "heater_check": {"weakest_k_per_s": 0.02}}, 0.02),
+    ],
 )
-def test_the_check_goes_by_the_rated_power_unless_it_is_told_better(said, weakest):
-    check = {"weakest_k_per_s": said["check"]} if "check" in said else {}
-    rated = {"heater_w": said["heater_w"]} if "heater_w" in said else {}
-    table = {"setpoint_c": 37.5, "trip_above_c": 60.0, "heater_check": check} | rated
+def test_the_check_goes_by_watts_and_litres_unless_it_is_told_better(said, weakest):
+    table = {"setpoint_c": 37.5, "trip_above_c": 60.0} | said
     plan = plan_for(load({"loops": {"tank": table}}).loops["tank"])
     assert plan.heater_check.weakest_k_per_s == pytest.approx(weakest)
 

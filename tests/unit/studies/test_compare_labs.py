@@ -208,6 +208,15 @@ def test_the_heater_of_a_lab_is_checked_as_that_of_a_rig_by_what_it_is_rated():
         assert law.plan_for(plant(fleet, 3)).heater_check == HeaterCheck(weakest_of(heater_w))
 
 
+def test_litres_that_are_configured_are_those_of_the_configured_watts():
+    law = contender("on-off", TABLE.model_copy(update={"volume_l": 8.0}))
+    for fleet, weakest in (
+        ("tclab", weakest_of(1.0)),
+        ("rig", weakest_of(TABLE.heater_w, 8.0)),
+    ):
+        assert law.plan_for(plant(fleet, 3)).heater_check == HeaterCheck(weakest)
+
+
 def test_a_lab_has_settled_within_its_own_band_in_runs_and_in_bounds():
     where = plant("tclab", 3)
     trace = play(held(0.5), where, replace(SCENARIOS["warm-up"], judged_s=5.0))

@@ -24,7 +24,8 @@ from thermoctl.app.commands.results import (
     watched,
     write_figures,
 )
-from thermoctl.app.configuration.tables import LoopTable, Options
+from thermoctl.app.configuration.bases import Options
+from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.parts import plan_for
 from thermoctl.app.plugins import BadOption
 from thermoctl.app.settings import load
@@ -129,14 +130,20 @@ def _plan(table: LoopTable, where: Plant, *, nameplate: bool, fitted: bool) -> P
 
 
 def _fitted(table: LoopTable, usage: Usage) -> LoopTable:
-    """Return the loop as `usage` has it; what that leaves open is as it was."""
+    """Return the loop as `usage` has it; what that leaves open is as it was.
+
+    Litres are those of the configured watts alone.
+    """
     own = {
         "setpoint_c": usage.held_c,
         "setpoint_max_c": usage.setpoint_max_c,
         "trip_above_c": usage.trip_above_c,
         "heater_w": usage.heater_w,
     }
-    table = table.model_copy(update={name: each for name, each in own.items() if each is not None})
+    told: dict[str, Any] = {name: each for name, each in own.items() if each is not None}
+    if "heater_w" in told:
+        told["volume_l"] = None
+    table = table.model_copy(update=told)
     return table if usage.gain_k_per_s is None else _told(table, usage.gain_k_per_s)
 
 

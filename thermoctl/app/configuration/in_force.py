@@ -16,11 +16,13 @@ def in_force(settings: Settings) -> dict[str, Any]:
     """Return every key with its value, options of laws too, as `load` takes it.
 
     An option is what the law was built with: where a loop's table decides it, that is its value.
+    So is the gain of a model what follows from watts and litres.
     """
     content = settings.in_force()
     for name, table in settings.loops.items():
         for key, law in _laws(table).items():
             content["loops"][name][key] |= _options(law)
+        content["loops"][name]["model"]["gain_k_per_s"] = table.gain_k_per_s
         if "jump_k" not in table.model_fields_set:
             del content["loops"][name]["jump_k"]  # written down, it would no longer widen by itself
     return content

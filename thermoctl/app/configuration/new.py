@@ -13,25 +13,20 @@ import click
 from thermoctl.app import plugins
 from thermoctl.app.commands.options import FILE, examples
 from thermoctl.app.compose import ACCEPTANCE, wiring_errors
+from thermoctl.app.configuration.device_tables import SensorTable
 from thermoctl.app.configuration.document import BadConfiguration, Document, Problem
-from thermoctl.app.configuration.tables import SensorTable
 from thermoctl.app.configuration.toml_text import toml_value
-from thermoctl.app.doubts import HEADROOM_K, Doubt, doubts
+from thermoctl.app.doubts import HEADROOM_K, NO_HARDWARE, Doubt, doubts
 from thermoctl.app.parts import sensor_for
 from thermoctl.app.reach import reach_c
 from thermoctl.app.settings import settings_in
 from thermoctl.control.adaptive import Adaptive
 from thermoctl.errors import ConfigError, Refused
-from thermoctl.quantities import WATER_J_PER_L_K
 
 _USUAL_TRIP_K, _LEAST_TRIP_K = 20.0, 2.0  # how far a trip that nobody named is from the set point
-_WEAKEST_SHARE, _WEAKEST_K_PER_S = 0.2, (1e-6, 0.5)
-"""Share of the rise by litres and watts that a sound plant makes at least, for vessel, losses and
-what was misjudged; and which rises can be told, in K/s."""
 _NEAR_BOILING_C, _BOILING_C = 95.0, 100.0
 _CURVES = list(SensorTable.model_json_schema()["properties"]["curve"]["enum"])
 _RESISTIVE = ("pt100", "pt1000", "ntc")
-_NO_HARDWARE: Final = ("null", "simulated")
 """Boards behind which nothing can be heated by mistake."""
 _NEVER_GUESSED: Final = ("port", "volume_l", "heater_w")
 """What only somebody who has seen a real board can know."""
@@ -70,18 +65,6 @@ class Answers:
     mode: str
     resume: bool
     accept_no_dead_man: bool
-
-    @property
-    def gain_k_per_s(self) -> float:
-        """Heating rate at full power, in K/s."""
-        return self.heater_w / (WATER_J_PER_L_K * self.volume_l)
-
-    @property
-    def weakest_k_per_s(self) -> float | None:
-        """Least of it that a sound plant makes, in K/s; None where that can not be told."""
-        weakest = float(f"{_WEAKEST_SHARE * self.gain_k_per_s:.2g}")
-        least, most = _WEAKEST_K_PER_S
-        return weakest if least <= weakest <= most else None
 
     @property
     def setpoint_max_c(self) -> float:
@@ -178,7 +161,7 @@ def _answers(interview: _Interview) -> Answers:
     kinds = list(plugins.kinds(plugins.DRIVERS))
     first = "simulated" if "simulated" in kinds else kinds[0]
     kind = ask("kind", "Board", first, click.Choice(kinds))
-    port, real = None, kind not in _NO_HARDWARE
+    port, real = None, kind not in NO_HARDWARE
     if real:
         interview.refuse_to_guess(kind)
     if "port" in plugins.find(plugins.DRIVERS, kind).Settings.model_fields:
@@ -233,7 +216,6 @@ def commented(answers: Answers) -> str:
             *_board_lines(answers),
             "",
             *_loop_lines(answers),
-            *_check_lines(answers),
             *_service_lines(answers),
             "",
         )
@@ -255,14 +237,13 @@ def _board_lines(answers: Answers) -> list[str]:
 def _loop_lines(answers: Answers) -> list[str]:
     stage = plugins.find(plugins.DRIVERS, answers.kind).Settings.model_fields.get("power_stage")
     pull_up = [] if answers.pull_up_ohm is None else [_line("pull_up_ohm", answers.pull_up_ohm)]
-    gain = float(f"{answers.gain_k_per_s:.3g}")
-    size = f"{answers.heater_w:g} W / ({WATER_J_PER_L_K:g} J/(l K) x {answers.volume_l:g} l)"
     return [
         "[loops.tank]",
         _line("setpoint_c", answers.setpoint_c, "degC to hold"),
         _line("trip_above_c", answers.trip_above_c, "heater off above this until acknowledged"),
         *_trip_below_lines(answers),
-        _line("heater_w", answers.heater_w, "so that watts and litres are told"),
+        _line("heater_w", answers.heater_w, "rated power; so that watts and litres are told"),
+        _line("volume_l", answers.volume_l, "that it warms; if it does not, that is told soon"),
         _line("setpoint_max_c", answers.setpoint_max_c, "no set point above this is accepted"),
         _line("period_s", 1.0, "one sample, one power, once a second"),
         _line("mode", answers.mode, "at the first start: off, manual or auto"),
@@ -282,8 +263,7 @@ def _loop_lines(answers: Answers) -> list[str]:
         _line("calmness", Adaptive().calmness, "0.2 is brisk, 0.8 calm"),
         "",
         "[loops.tank.model]",
-        _line("structure", "known-gain"),
-        _line("gain_k_per_s", gain, size),
+        _line("structure", "known-gain", "the gain is that of heater_w and volume_l"),
         "",
         "[loops.tank.estimator]",
         _line("kind", "ckf", "the corrected Kalman filter"),
@@ -300,14 +280,6 @@ def _trip_below_lines(answers: Answers) -> list[str]:
     )
     coldest_c, _ = reach_c(sensor_for(table))
     return [_line("trip_below_c", trip_below_c, "and below this")] * (trip_below_c > coldest_c)
-
-
-def _check_lines(answers: Answers) -> list[str]:
-    if answers.weakest_k_per_s is None:
-        return []
-    why = "a fifth of gain_k_per_s; less is a fault"
-    weakest = _line("weakest_k_per_s", answers.weakest_k_per_s, why)
-    return ["", "[loops.tank.heater_check]", weakest]
 
 
 def _service_lines(answers: Answers) -> list[str]:

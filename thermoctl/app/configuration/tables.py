@@ -5,138 +5,24 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Tag,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, field_validator, model_validator
 
+from thermoctl.app.configuration.bases import Celsius, Finite, Options, Positive, Table
+from thermoctl.app.configuration.device_tables import (
+    Actuator,
+    ActuatorTable,
+    CascadeTable,
+    CoolerTable,
+    SensorTable,
+)
 from thermoctl.estimation import LainiotisBank, Order
+from thermoctl.quantities import WATER_J_PER_L_K
 from thermoctl.signals import Mode
 
-Celsius = Annotated[float, Field(ge=-273.15, le=2000.0, allow_inf_nan=False)]
-Fraction = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Past = Annotated[int, Field(le=10)]
 Delay = Annotated[int, Field(le=120)]
 FirstMode = Literal[Mode.OFF, Mode.MANUAL, Mode.AUTO]
 """What a loop can start in; a program has to be loaded first."""
-
-
-class Table(BaseModel):
-    """A table whose keys are all known; frozen once it is read."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, validate_default=True, allow_inf_nan=False
-    )
-
-
-class Options(BaseModel):
-    """A table that names a ``kind``; its other keys are the options of that kind."""
-
-    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
-
-    kind: str = Field(description="Which one; `thermoctl drivers` and the manual list them.")
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """Every key but ``kind``."""
-        return dict(self.__pydantic_extra__ or {})
-
-
-class SensorTable(Table):
-    """Table ``[loops.NAME.sensor]``: which input, and what its counts mean."""
-
-    board: str = Field(description="Name of the board in [boards.NAME].")
-    input: str = Field("temperature", description="Channel of the board.")
-    curve: Literal["lm335", "lm35", "tmp36", "pt100", "pt1000", "ntc", "linear"] = Field(
-        "lm335", description="Law from volts to degC."
-    )
-    reference_v: Positive = Field(5.0, description="Volts at full scale of the converter.")
-    calibration_gain: float = Field(
-        1.0, ge=0.8, le=1.25, description="One-point calibration: a factor on volts."
-    )
-    calibration_offset_k: float = Field(0.0, ge=-20, le=20, description="Added after the curve.")
-    pull_up_ohm: Positive | None = Field(None, description="Series resistor of pt100, pt1000, ntc.")
-    supply_v: Positive | None = Field(None, description="Voltage across it; reference_v if absent.")
-    beta_k: Positive = Field(3950.0, description="Beta of an ntc.")
-    r25_ohm: Positive = Field(10_000.0, description="Resistance of an ntc at 25 degC.")
-    kelvin_per_v: Finite = Field(100.0, description="Slope of a linear sensor.")
-    zero_v_c: Finite = Field(0.0, description="Temperature of a linear sensor at 0 V.")
-    open_above: Fraction = Field(0.98, description="Fraction of full scale that means: open.")
-    short_below: Fraction = Field(0.02, description="Fraction of full scale that means: short.")
-
-    @model_validator(mode="after")
-    def _resistive_sensors_need_a_pull_up(self) -> Self:
-        if self.curve in ("pt100", "pt1000", "ntc") and self.pull_up_ohm is None:
-            raise ValueError(
-                f"pull_up_ohm must be the resistor that a {self.curve} is read with, got none"
-            )
-        return self
-
-
-class ActuatorTable(Table):
-    """Table ``[loops.NAME.actuator]``: which output, and how power becomes its drive."""
-
-    board: str = Field(description="Name of the board in [boards.NAME].")
-    output: str = Field("heater", description="Channel of the board.")
-    law: Literal["linear", "square", "phase-angle", "burst"] = Field(
-        "linear", description="linear: the board takes power itself; square: P ~ V^2; ..."
-    )
-    cycles: int = Field(50, ge=1, description="Mains cycles of one burst, for law burst.")
-    window_s: Annotated[float, Field(ge=0.0, le=600.0)] = Field(
-        0.0,
-        description="How late the output may obey: its window, or the least time it stays on; what "
-        "it reports beyond the command for longer is a fault.",
-    )
-
-
-class CascadeTable(Table):
-    """Table ``[loops.NAME.actuator]`` of a loop that gives another one its set point."""
-
-    loop: str = Field(description="Name of the loop that follows.")
-    low_c: Celsius = Field(description="Its set point at power 0.")
-    high_c: Celsius = Field(description="Its set point at full power.")
-
-    @model_validator(mode="after")
-    def _low_below_high(self) -> Self:
-        if not self.low_c < self.high_c:
-            raise ValueError(
-                f"low_c must be less than high_c ({self.high_c:g}), got {self.low_c:g}"
-            )
-        return self
-
-
-def _what_acts(value: Any) -> str:
-    """Return which of the two tables of an actuator `value` is: it has a loop, or a board."""
-    leads = "loop" in value if isinstance(value, dict) else isinstance(value, CascadeTable)
-    return "<loop>" if leads else "<board>"
-
-
-Actuator = Annotated[
-    Annotated[ActuatorTable, Tag("<board>")] | Annotated[CascadeTable, Tag("<loop>")],
-    Discriminator(_what_acts),
-]
-"""An output, or another loop. Its tags are in brackets, for no key is: a path leaves them out."""
-
-
-class CoolerTable(ActuatorTable):
-    """Table ``[loops.NAME.cooler]``: the output of a power below 0, which cools."""
-
-    output: str = Field("cooler", description="Channel of the board.")
-    power_max: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
-        1.0, description="Most of its power ever given, as a fraction."
-    )
-    changeover_s: Annotated[float, Field(ge=0.0, le=3600.0)] = Field(
-        0.0,
-        description="How long heater and cooler are both off before the other one begins; never "
-        "less than a period.",
-    )
 
 
 class GuardsTable(Table):
@@ -193,8 +79,9 @@ class ModelTable(Table):
     )
     gain_k_per_s: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
         0.0449,
-        description="Heating rate at full power; 1,500 W in 8 l gives 0.0449. arx: the first "
-        "guess, and a fifth of it the least gain that is believed while the guards are on.",
+        description="Heating rate at full power; left out, what the loop's `heater_w` does to its "
+        "`volume_l`, and without these 0.0449, which is 1,500 W in 8 l. arx: the first guess, and "
+        "a fifth of it the least gain that is believed while the guards are on.",
     )
     n: Past = Field(2, ge=1, description="arx: how many past temperatures.")
     m: Past = Field(2, ge=1, description="arx: how many past powers.")
@@ -222,9 +109,9 @@ class HeaterCheckTable(Table):
     weakest_k_per_s: Annotated[float, Field(ge=1e-6, le=0.5)] | None = Field(
         None,
         description="Least rise at full power, in K/s, that a healthy plant can have; left out, "
-        "what `heater_w` does to 400 l of water, and without that 6e-5, which is 50 W in 200 l. "
-        "The more is said here, the less a heater that was never seen to heat may "
-        "give before it is called a fault.",
+        "a fifth of what `heater_w` does to `volume_l`, without litres what it does to 400 l of "
+        "water, and without watts 6e-5, which is 50 W in 200 l. The more is said, the less a "
+        "heater that was never seen to heat may give before it is called a fault.",
     )
     first_heat_s: Annotated[float, Field(ge=10.0, le=3600.0)] = Field(
         60.0,
@@ -284,6 +171,11 @@ class LoopTable(Table):
         None,
         description="Rated power of the heater in W; with it, watts and litres are told, and a "
         "heater that was never seen to heat is checked by what so much does at least.",
+    )
+    volume_l: Annotated[float, Field(ge=0.01, le=1e6)] | None = Field(
+        None,
+        description="Water that it warms, in l; with it, a heater that fails before it was ever "
+        "seen to heat, or a sensor beside its tank, is told within minutes instead of hours.",
     )
     jump_k: Positive = Field(
         1.0,
@@ -346,6 +238,20 @@ class LoopTable(Table):
             text = f"must be from {low_c:g} to {high_c:g} and below {trip}, got {held_c:g}"
             raise ValueError(f"setpoint_c {text}")
         return self
+
+    @model_validator(mode="after")
+    def _litres_need_watts(self) -> Self:
+        if self.volume_l is not None and self.heater_w is None:
+            raise ValueError("heater_w must be the watts that warm volume_l, got none")
+        return self
+
+    @property
+    def gain_k_per_s(self) -> float:
+        """Heating rate at full power in K/s: that of the model, or of watts and litres."""
+        given = "gain_k_per_s" in self.model.model_fields_set
+        if given or self.heater_w is None or self.volume_l is None:
+            return self.model.gain_k_per_s
+        return self.heater_w / (WATER_J_PER_L_K * self.volume_l)
 
     @property
     def outputs(self) -> tuple[ActuatorTable, ...]:

@@ -44,6 +44,7 @@ _SENTENCES: Mapping[str, tuple[Mark, tuple[str, ...]]] = {
     "config.coarse": (Mark.WARNING, ("Coarse readings: {text}", "Readings are coarse")),
     "config.narrow": (Mark.WARNING, ("Near a trip: {text}", "Set point near a trip")),
     "config.loaded": (Mark.NONE, ("Settings loaded: {path}", "Settings loaded")),
+    "config.unstated": (Mark.WARNING, ("Litres not told: {text}", "Litres not told")),
     "controller.changed": (
         Mark.NONE,
         ("Controller {after}, was {before}", "Controller changed"),

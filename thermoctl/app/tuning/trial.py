@@ -101,7 +101,7 @@ def plan(
             f"expected powers up to {table.power_max:g}, the power_max of loop {name!r},"
             f" got {high:g}"
         )
-    rise_k = table.model.gain_k_per_s * high
+    rise_k = table.gain_k_per_s * high
     top_c, bottom_c = table.setpoint_c, table.setpoint_c - band_k
     if not bottom_c >= table.setpoint_range_c[0]:
         raise ConfigError(

@@ -10,9 +10,13 @@ from thermoctl.ranges import check_ranges, ranged
 
 WEAKEST_K_PER_S = 6e-5
 """Least gain in K/s of a healthy plant where nothing is configured: 50 W in 200 l."""
+WEAKEST_RANGE_K_PER_S = 1e-6, 0.5
 LARGEST_J_PER_K = 400.0 * WATER_J_PER_L_K
 """Largest heat capacity of a plant in J/K: twice that of 200 l of water, to allow for the vessel
 and for losses meanwhile."""
+HEALTHY_SHARE = 0.2
+"""Share of the rise by litres and watts that a sound plant makes at least, for vessel, losses and
+what was misjudged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +42,7 @@ class HeaterCheck:
         An argument is outside its range.
     """
 
-    weakest_k_per_s: float = ranged(WEAKEST_K_PER_S, 1e-6, 0.5)
+    weakest_k_per_s: float = ranged(WEAKEST_K_PER_S, *WEAKEST_RANGE_K_PER_S)
     first_heat_s: float = ranged(60.0, 10.0, 3600.0)
     action: Literal["heat", "cool", "heat-cool"] = "heat"
     block_c: tuple[float, float] | None = None
@@ -72,10 +76,18 @@ class Reacts(Protocol):
         ...
 
 
-def weakest_of(heater_w: float | None) -> float:
-    """Return the least rise in K/s at full power that a heater of this power makes.
+def weakest_of(heater_w: float | None, volume_l: float | None = None) -> float:
+    """Return the least rise in K/s at full power that a sound heater makes.
 
     4 kW warm no vessel as slowly as 50 W may. Where the power is not known, 50 W are assumed.
+
+    Parameters
+    ----------
+    heater_w, volume_l : float or None
+        Its power in W, and the water that it warms in l; None: not known.
     """
+    if heater_w is not None and volume_l is not None:
+        rate = HEALTHY_SHARE * heater_w / (WATER_J_PER_L_K * volume_l)
+        return clamp(rate, *WEAKEST_RANGE_K_PER_S)
     rate = 0.0 if heater_w is None else heater_w / LARGEST_J_PER_K
-    return clamp(rate, WEAKEST_K_PER_S, 0.5)
+    return clamp(rate, WEAKEST_K_PER_S, WEAKEST_RANGE_K_PER_S[1])
