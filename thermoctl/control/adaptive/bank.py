@@ -205,23 +205,45 @@ class Bank:
         seen, way = math.isfinite(y_c), ahead.path
         if belief.full is None and not seen:
             return belief._replace(path=way, excitation=ahead.excitation)
+        rested = self._rested(belief, ahead, y_c) if seen else None
+        if rested is not None:
+            return rested
         met = self._seen(belief, ahead, y_c) if seen else self._unseen(belief, ahead)
-        weights = met.weights
-        kept = ahead.gains is not None and met.gains is not None and weights is belief.weights
-        always = way, weights.share, self.hypotheses, self.constants
-        if kept and belief.outlook is not None:
-            view = renewed(belief.outlook, met.x, *always)
-            whole = met.surprise_k  # it tells of all that is new: no weight is 0
-        else:
-            block = filters.joined(met.full, met.x)
-            view, whole = outlook(block, *always), float(np.vdot(block, block))
-            frozen(met.full)
-        if not math.isfinite(whole + view.coasting_c):
+        block = filters.joined(met.full, met.x)
+        view = outlook(block, way, met.weights.share, self.hypotheses, self.constants)
+        if not math.isfinite(float(np.vdot(block, block)) + view.coasting_c):
             raise ArithmeticError(f"expected a finite belief after {y_c!r} degC")
-        for array in (met.x, *way):
+        for array in (met.full, met.x, *way):
             frozen(array)
         blind = 0 if seen else belief.blind + 1
         return BankBelief(belief.sample + 1, blind, ahead.excitation, way, *met, view)
+
+    def _rested(self, belief: BankBelief, ahead: Prediction, y_c: float) -> BankBelief | None:
+        """Return the belief after `y_c` by gains that are kept; None where it is no rest."""
+        gains, full, x, before = ahead.gains, ahead.full, ahead.x, belief.outlook
+        if gains is None or full is None or x is None or before is None:
+            return None
+        way, drifting, m = ahead.path, belief.drifting, belief.weights.likeliest
+        nu, S_m = y_c - x.item(Z, m), gains.S.item(m)
+        noise, weights = self._noise(belief, nu, y_c)
+        gate = self._gated(belief, ahead, y_c, weights, noise.believed, nu * nu / S_m)
+        if belief.sample + 1 >= drifting.silent_until:
+            drifting = self._drifted(belief, True, nu / math.sqrt(S_m))
+        if gate.outside or drifting.found:
+            return None
+        surprise_k = y_c - float(belief.weights.share.dot(x[Z]))
+        x = filters.followed(x, y_c, gains.K, self.constants)
+        always = way, weights.share, self.hypotheses, self.constants
+        if weights is belief.weights:
+            view = renewed(before, x, *always)
+        else:
+            view = outlook(filters.joined(full, x), *always)
+        if not math.isfinite(surprise_k + view.coasting_c):  # of all that is new: no weight is 0
+            raise ArithmeticError(f"expected a finite belief after {y_c!r} degC")
+        for array in (x, *way):
+            frozen(array)
+        met = noise, gate, weights, drifting, 0.0, surprise_k, full, x, gains.older(kept=True)
+        return BankBelief(belief.sample + 1, 0, ahead.excitation, way, *met, view)
 
     def lost(self, belief: BankBelief) -> BankBelief:
         """Return the belief after a gap of which the applied power is not known."""
@@ -247,18 +269,6 @@ class Bank:
             block = filters.restarted(belief.block, self.hypotheses, y_c)
         return self._predicted(block, ahead.path, belief, ahead.unrest)
 
-    def _misled(self, belief: BankBelief, block: filters.Block | None, y_c: float) -> bool:
-        """Return whether the first reading was wrong, as the second one, `y_c`, is far from it.
-
-        Nothing was there to hold the first against, and what it is missed by would pass for gain.
-        Once is enough: a plant that does move as fast goes on from the second reading.
-        """
-        if block is None or belief.sample != belief.blind:
-            return False
-        m = belief.weights.likeliest
-        nu, S_m = y_c - float(block[Z, X, m]), float(block[Z, Z, m]) + belief.noise.believed
-        return nu * nu > self.hearing.gate_sds**2 * S_m
-
     def _unseen(self, belief: BankBelief, ahead: Prediction) -> Correction:
         """Return what becomes of the prediction without a reading: for some time, the belief."""
         _, blind, _, _, noise, gate, weights, drifting, *_ = belief
@@ -274,7 +284,8 @@ class Bank:
         block, x, gains, m = ahead.full, ahead.x, ahead.gains, belief.weights.likeliest
         nu = math.nan if x is None else y_c - x.item(Z, m)
         noise, weights = self._noise(belief, nu, y_c)
-        if belief.noise.samples == 1 and self._misled(belief, block, y_c):
+        first = belief.noise.samples == 1
+        if first and likelihood.misled(belief, block, y_c, self.hearing.gate_sds):
             belief, noise, x = belief._replace(full=None), belief.noise.anew(y_c), None
         if block is None or x is None:
             block, surprise_k = self._begun(belief, ahead, y_c), math.nan
@@ -291,15 +302,14 @@ class Bank:
         if gate.jumped or drifting.found:
             block = filters.joined(block, x)
             block, drifting, gains = self._disturbed(belief, block, gate, nu, noise.believed)
-        if gains is not None:
-            x, gains = filters.followed(x, y_c, gains.K, self.constants), gains.older(kept=True)
-            return Correction(noise, gate, weights, drifting, 0.0, surprise_k, block, x, gains)
         heard, before = self._heard(sample, share, noise, gate, drifting), block
         block, nis, S = filters.corrected(block, y_c, noise.believed, self.constants, share)
         if sample < gate.silent_until:  # what was poured in is colder, and loses less
             moved_k = block[T, X] - before[T, X]
             filters.grown(block[D, X], moved_k, self.constants, belief.noise.above_k)
-        self._limit(block, sample)
+        filters.limit_gain(block, self.constants)
+        if sample * self.period_s > LOSS_FROM_S:
+            filters.limit_loss(block, self.constants)
         gains = self._gains(belief, Corrected(before, block, S), drifting, still=still)
         if heard > 0.0:
             weights = weights.after(heard, nis, S)
@@ -308,12 +318,6 @@ class Bank:
         return Correction(
             noise, gate, weights, drifting, heard, surprise_k, block, block[:, X], gains
         )
-
-    def _limit(self, block: filters.Block, sample: int) -> None:
-        """Limit the gain and, as soon as that is known, the loss; in place."""
-        filters.limit_gain(block, self.constants)
-        if sample * self.period_s > LOSS_FROM_S:
-            filters.limit_loss(block, self.constants)
 
     def _heard(
         self, sample: int, share: float, noise: Noise, gate: Gate, drifting: Drifting

@@ -11,7 +11,7 @@ import numpy as np
 
 from thermoctl.control.adaptive.bank_belief import BankBelief, Prediction
 from thermoctl.control.adaptive.evidence import Weights
-from thermoctl.control.adaptive.filters import Z
+from thermoctl.control.adaptive.filters import Block, X, Z
 from thermoctl.quantities import Array
 
 
@@ -46,6 +46,19 @@ def foreseen(weights: Weights, ahead: Prediction, y_c: float, R: float, most_sds
         return False
     nis, S = surprises
     return nis.item(weights.after(1.0, nis, S).likeliest) <= most_sds**2
+
+
+def misled(belief: BankBelief, block: Block | None, y_c: float, most_sds: float) -> bool:
+    """Return whether the first reading was wrong, as the second one, `y_c`, is far from it.
+
+    Nothing was there to hold the first against, and what it is missed by would pass for gain. Once
+    is enough: a plant that does move as fast goes on from the second reading.
+    """
+    if block is None or belief.sample != belief.blind:
+        return False
+    m = belief.weights.likeliest
+    nu, S_m = y_c - float(block[Z, X, m]), float(block[Z, Z, m]) + belief.noise.believed
+    return nu * nu > most_sds**2 * S_m
 
 
 def _surprises(ahead: Prediction, y_c: float, R: float) -> tuple[Array, Array] | None:
