@@ -8,7 +8,13 @@ import pytest
 from thermoctl.regulator.heater.blocks import NEARLY_FULL, Block
 from thermoctl.regulator.heater.check import HeaterCheck
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen, clear_k
-from thermoctl.regulator.heater.standing import ANSWERED_S, STANDS_K, STANDS_S, Standing
+from thermoctl.regulator.heater.standing import (
+    ANSWERED_S,
+    STANDS_K,
+    STANDS_S,
+    STILL_K,
+    Standing,
+)
 from thermoctl.regulator.heater.watch import HeaterWatch
 from thermoctl.regulator.limits import Limits
 from thermoctl.regulator.supervisor import Supervisor
@@ -55,17 +61,31 @@ def test_nothing_is_asked_of_what_may_well_be_sound(sound):
 
 def test_a_rise_beyond_where_it_answered_is_news():
     standing, known = Standing(), Gain(0.04, 4e-4, 0)
-    stood = Seen(0.0, 20.0, (0.0,) * PLACES)
-    for risen_k, asked in ((0.0, False), (1.0, True)):
-        assert standing.question(known, WEAKEST, stood, NOISE_K, answered=True) is None
+
+    def asked(t_s, reading_c, answered=False):
+        seen = Seen(t_s, reading_c, (t_s,) * PLACES)
+        told = standing.question(known, WEAKEST, seen, NOISE_K, answered=answered)
+        standing.add(Block(BLOCK_S, 1.0, reading_c, NOISE_K), seen)
+        return told is not None
+
+    assert not asked(0.0, 20.0, answered=True)
+    begin_s = 0.0
+    for back_c, again in ((20.0, False), (21.0, True)):
+        for t_s, reading_c in ((0.0, 19.8), (ANSWERED_S, back_c), (ANSWERED_S + STANDS_S, back_c)):
+            last = asked(begin_s + t_s, reading_c)
+        assert last is again
         standing.clear()
-        for t_s, reading_c in ((0.0, 19.0), (ANSWERED_S, 20.0 + risen_k)):
-            now = Seen(t_s, reading_c, (t_s,) * PLACES)
-            standing.add(Block(BLOCK_S, 1.0, reading_c, NOISE_K), now)
-            assert standing.question(known, WEAKEST, now, NOISE_K, answered=False) is None
-        later = Seen(ANSWERED_S + STANDS_S, now.reading_c, (ANSWERED_S + STANDS_S,) * PLACES)
-        told = standing.question(known, WEAKEST, later, NOISE_K, answered=False)
-        assert (told is not None) is asked
+        begin_s += 2.0 * ANSWERED_S
+
+
+def test_what_moves_to_and_fro_does_not_stand():
+    standing, known, told = Standing(), Gain(0.04, 4e-4, 0), []
+    for k in range(int(3.0 * STANDS_S / BLOCK_S)):
+        reading_c = 20.0 - (k % 40 < 10) * 1.2 * STILL_K
+        seen = Seen(k * BLOCK_S, reading_c, (k * BLOCK_S,) * PLACES)
+        standing.add(Block(BLOCK_S, 1.0, reading_c, NOISE_K), seen)
+        told.append(standing.question(known, WEAKEST, seen, NOISE_K, answered=False))
+    assert told == [None] * len(told)
 
 
 def test_less_power_begins_the_stretch_anew():
@@ -78,7 +98,11 @@ def test_less_power_begins_the_stretch_anew():
 
 
 class Vessel:
-    """A watch over what loses more the hotter it is; `shows` is what is read of it."""
+    """A watch over what loses more the hotter it is.
+
+    `shows` is what is read of it, `left` the share of the heater that is left at a temperature, and
+    `poured` the share of the water for which cold water comes in a second.
+    """
 
     def __init__(self, gain=0.02, cools_per_s=4e-4, lag_s=20.0, seed=1, **check):
         self.gain, self.cools_per_s, self.pole_s = gain, cools_per_s, 0.5 * lag_s
@@ -86,6 +110,7 @@ class Vessel:
         self.supervisor = Supervisor(Limits(200.0, -50.0, -50.0, 200.0), self.emit)
         self.watch = HeaterWatch(HeaterCheck(**check), 1.0, self.supervisor, self.emit)
         self.rng, self.shows = np.random.default_rng(seed), lambda water_c: water_c
+        self.left, self.poured = lambda water_c: 1.0, lambda t_s: 0.0
         self.t_s, self.water_c, self.applied, self.given_s = 0.0, 20.0, 0.0, 0.0
         self.first = self.second = 0.0
 
@@ -100,7 +125,9 @@ class Vessel:
         for _ in range(round(seconds)):
             self.first += (self.applied - self.first) / self.pole_s
             self.second += (self.first - self.second) / self.pole_s
-            self.water_c += self.gain * self.second - self.cools_per_s * (self.water_c - 20.0)
+            self.water_c += self.gain * self.second * self.left(self.water_c)
+            self.water_c -= self.cools_per_s * (self.water_c - 20.0)
+            self.water_c -= self.poured(self.t_s) * (self.water_c - 5.0)
             self.t_s += 1.0
             reading_c = self.shows(self.water_c) + 0.01 * self.rng.standard_normal()
             self.supervisor.judge(Measurement(self.t_s, reading_c), self.t_s, 1.0)
@@ -121,6 +148,30 @@ def test_a_vessel_at_its_limit_answers_and_goes_on(gain, cools_per_s, lag_s):
     assert set(vessel.names()) == {"heater.questioned", "heater.answered"}
     assert vessel.given_s > 0.97 * vessel.t_s
     assert vessel.supervisor.state is State.RUN
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("from_c", [20.0, 30.0], ids=["jacket", "ptc"])
+@pytest.mark.parametrize("cools_per_s", [5e-5, 2e-4])
+def test_a_heater_that_gives_less_the_hotter_its_vessel_is_answers_at_its_limit(
+    from_c, cools_per_s
+):
+    vessel = Vessel(0.02, cools_per_s, 10.0, weakest_k_per_s=9e-4)
+    vessel.left = lambda water_c: min(max((55.0 - water_c) / (55.0 - from_c), 0.0), 1.0)
+    vessel.run(6 * 3600)
+    assert set(vessel.names()) == {"heater.questioned", "heater.answered"}
+    assert vessel.supervisor.state is State.RUN
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "every_s"), [(0.03, 300.0), (0.03, 600.0)])
+def test_cold_portions_at_a_limit_condemn_no_heater(share, every_s):
+    for seed in range(4):
+        vessel = Vessel(0.006, 3.3e-4, 6.0, seed, weakest_k_per_s=9e-4)
+        vessel.poured = lambda t_s: share / 40.0 if t_s % every_s < 40.0 else 0.0
+        vessel.run(4 * 3600)
+        assert set(vessel.names()) <= {"heater.questioned", "heater.answered"}, seed
+        assert vessel.given_s > 0.95 * vessel.t_s, seed
 
 
 @pytest.mark.slow

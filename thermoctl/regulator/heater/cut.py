@@ -24,6 +24,8 @@ class Cut(NamedTuple):
         Whether a little heat was given first, after a bad answer, to a reading that stood still.
     quiet : bool
         Whether nobody is told yet: the next heat was announced as the question.
+    stands : bool
+        Whether the plant may be at what it can reach, where little is left of its gain.
     """
 
     at_s: float
@@ -34,3 +36,4 @@ class Cut(NamedTuple):
     crept: bool = False
     portion: bool = False
     quiet: bool = False
+    stands: bool = False

@@ -23,6 +23,10 @@ BAD_S, BAD_LAGS = 60.0, 2.0
 """The same for a bad answer."""
 QUIET_LAGS = 3.0
 """Time in lags after which a heater that has given a little heat is late with its answer."""
+LEFT, LEFT_SURE = 0.15, 2.0
+"""Share of its gain that is left to a heater at what its plant can reach: a jacket, a PTC element
+or a compressor gives less the nearer it comes, and without it a plant that is well insulated cools
+by as little. And the least number of standard deviations by which so little is an answer."""
 RISES_SDS = 5.0
 """Standard deviations of a reading by which it has risen."""
 SHOWS = "{:.0f} s without power show a gain of {:.2g} K/s"
@@ -76,7 +80,12 @@ def answer(
     sure : float
         Standard deviations by which an answer has to differ from nothing.
     """
-    found, shown = question.of_known_rows(rows, cut.from_s, cut.at_s, known, sd_k, sure)
+    least = known
+    if cut.stands:
+        least, sure = known._replace(mean=LEFT * known.mean), max(sure, LEFT_SURE)
+    found, shown = question.of_known_rows(rows, cut.from_s, cut.at_s, least, sd_k, sure)
+    if found is Answer.COOLS and shown.mean > -question.ANSWERS * known.mean:
+        found = Answer.OPEN  # so little is left of a load or of the weather
     late = sure < question.SURE
     if cut.began_s is None:
         unsure = cut.portion and found in (Answer.OPEN, Answer.LATE)

@@ -18,6 +18,8 @@ from thermoctl.regulator.heater.response import Gain, Seen, clear_k
 
 STANDS_S, ANSWERED_S = 900.0, 7200.0
 """Time in s under nearly full power without a rise: until it is asked, and until it is again."""
+STILL_K, STILL_SDS = 0.5, 8.0
+"""Range within which a reading stands, in K and in standard deviations, the larger of the two."""
 STANDS_K, SHOWS = 1.5, 2.0
 """Least heat of that time: in K by the gain that is known, and in rises that could be seen by the
 least gain of a sound heater. In a first warm-up a sensor that comes to its water passes for one of
@@ -34,13 +36,16 @@ class Standing:
     def clear(self) -> None:
         """Begin a stretch anew."""
         self._from: Seen | None = None
+        self._lowest_c, self._highest_c = math.inf, -math.inf
 
     def add(self, block: Block, before: Seen) -> None:
         """Take in a block that began with `before`."""
         if block.power <= NEARLY_FULL:
-            self._from = None
-        elif self._from is None:
-            self._from = before
+            self.clear()
+            return
+        self._from = self._from or before
+        self._lowest_c = min(self._lowest_c, before.reading_c)
+        self._highest_c = max(self._highest_c, before.reading_c)
 
     def question(
         self, gain: Gain, weakest: float, now: Seen, sd_k: float, *, answered: bool
@@ -59,11 +64,13 @@ class Standing:
         heat_s = now.heat_s[gain.place] - start.heat_s[gain.place]
         if gain.mean * heat_s < STANDS_K or weakest * heat_s < SHOWS * least_k:
             return None
-        self._from = now
         span_s, rise_k = now.t_s - start.t_s, now.reading_c - start.reading_c
-        if rise_k <= least_k:
+        still = self._highest_c - self._lowest_c <= max(STILL_K, STILL_SDS * sd_k)
+        self.clear()
+        if still and rise_k <= least_k:
             why = f"expected a rise by full power in {span_s / 60.0:.0f} min, got {rise_k:+.2f} K"
-            return Cut(now.t_s, now.t_s - max(CREPT_LAGS * gain.lag_s, BEFORE_S), why)
+            from_s = now.t_s - max(CREPT_LAGS * gain.lag_s, BEFORE_S)
+            return Cut(now.t_s, from_s, why, stands=True)
         if now.reading_c > self._answered_c + least_k:
             self._least_s = STANDS_S
         return None

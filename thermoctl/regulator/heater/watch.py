@@ -172,7 +172,7 @@ class HeaterWatch:
         """Take a bad answer back, or a doubt: the plant gets no warmer."""
         if self._cut is not None or self._distrusted_k > 0.0:
             self._emit("heater.answered", text=ceiling.TEXT.format(self.ceiling_c))
-        self._trial.begin(self._t_s)
+        self._trial.settle(self._t_s)
         self._verdicts.take_back()
         self._distrusted_k = 0.0
         self._trust()
@@ -217,9 +217,8 @@ class HeaterWatch:
             self._latch_if_heated(known, now, sd_k, t_s) or self._falls_short(known, now, sd_k)
         ):
             return  # one that is proven is judged by what may come late, below
-        again = self._distrusted_k > 0.0
+        again, proven = self._distrusted_k > 0.0, self._heater.proven
         follow = not again and self._climb.calm(sd_k)
-        proven = self._heater.proven
         doubt.compare(
             known, block, before, now, jumped=jumped, follow=follow, again=again, proven=proven
         )
@@ -345,9 +344,10 @@ class HeaterWatch:
 
     def _accept(self, shown: Gain, asked_s: float) -> None:
         """Go on with a heater that heats, and with the gain it has shown if that is news."""
-        if self._cut is None or not self._cut.quiet:
+        if (cut := self._cut) is None or not cut.quiet:
             self._emit("heater.answered", text=hearing.told(shown, asked_s, known=self.known))
-        self._heater.accept(shown, more=self._cut is None or self._cut.began_s is None)
+        if cut is None or not cut.stands:  # what is left at a limit is no gain
+            self._heater.accept(shown, more=cut is None or cut.began_s is None)
         self._trial.settle(self._t_s)
         self._distrusted_k = 0.0
         self._trust()
