@@ -49,7 +49,7 @@ def foreseen(weights: Weights, ahead: Prediction, y_c: float, R: float, most_sds
 
 
 def misled(belief: BankBelief, block: Block | None, y_c: float, most_sds: float) -> bool:
-    """Return whether the first reading was wrong, as the second one, `y_c`, is far from it.
+    """Return whether the first reading was wrong: the second, `y_c`, is far from it.
 
     Nothing was there to hold the first against, and what it is missed by would pass for gain. Once
     is enough: a plant that does move as fast goes on from the second reading.
