@@ -45,7 +45,8 @@ class Inexact(NamedTuple):
         if pulses_s > 0.0 and situation.applied == 0.0:
             off = 0.0
         if abs(off) <= INEXACT:
-            more += (off - more) * min(situation.interval_s / INEXACT_S, 1.0)
+            share = situation.interval_s / INEXACT_S
+            more += (off - more) * (share if share < 1.0 else 1.0)
         return Inexact(more, pulses_s)
 
     def made_up_for(self, power: float) -> float:
@@ -54,9 +55,10 @@ class Inexact(NamedTuple):
         A law knows what was given, and so what the plant will do. It would never learn that it is
         not given what it asks for.
         """
+        exact = power - self.more
         if power > 0.0:
-            return max(power - self.more, 0.0)
-        return min(power - self.more, 0.0) if power < 0.0 else power
+            return exact if exact > 0.0 else 0.0
+        return min(exact, 0.0) if power < 0.0 else power
 
 
 EXACT = Inexact()

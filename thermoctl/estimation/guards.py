@@ -179,7 +179,8 @@ class Guarded:
         assert isinstance(law, _WITH_R2)
         sd = NORMAL_SD * memory.ranked[len(memory.ranked) // 2]
         least = R2_FLOOR * law.R2 if self.R2_min is None else self.R2_min
-        R2 = max(sd * sd, least)
+        R2 = sd * sd
+        R2 = R2 if least < R2 else least
         return law if R2 == law.R2 else replace(law, R2=clamp(R2, 1.0 / LARGEST, LARGEST))
 
     def _remembered(self, memory: _Memory | None, rows: Array, phi: Array, y: float) -> _Memory:

@@ -203,7 +203,8 @@ class KnownGain:
 
     def pole(self, theta: Array, P: Array) -> tuple[float | None, float | None]:
         """Return a and its standard deviation."""
-        return float(theta[0]), math.sqrt(max(float(P[0, 0]), 0.0))
+        variance = float(P[0, 0])
+        return float(theta[0]), math.sqrt(variance) if variance > 0.0 else 0.0
 
 
 def _require_positive(name: str, value: float) -> None:

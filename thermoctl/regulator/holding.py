@@ -33,7 +33,8 @@ class Holding(NamedTuple):
             return Holding()
         power, held_s = self
         held_s += interval_s
-        share = min(1.0, interval_s / (held_s if held_s < MEMORY_S else MEMORY_S))
+        share = interval_s / (held_s if held_s < MEMORY_S else MEMORY_S)
+        share = share if share < 1.0 else 1.0
         return Holding(power + share * (applied - power), held_s)
 
     @property

@@ -221,11 +221,11 @@ class Regulator:
             self._feasibility.fail(weighed)
         ride_s = self._ride_s(situation, beliefs) if verdict in _BLIND else 0.0
         state = self._supervisor.rule(t_s, ride_s)  # 10. rule
-        asked, reason = self._ask(situation, state, beliefs)  # 11. decide
+        load = self._load.at(t_s)
+        asked, reason = self._ask(situation, state, beliefs, load)  # 11. decide
         self._steering.tell_remarks(t_s)
         self._command = self._supervisor.bound(asked, reason, t_s)  # 12. bound
         steered = self._wishes.mode is Mode.AUTO and state is State.RUN
-        load = self._load.at(t_s)
         self._shadow.decide(situation, self._command.power - load, seen_s, steered=steered)
         self._notice_unknown_power(t_s)
         self._applied = None
@@ -322,7 +322,9 @@ class Regulator:
             return 0.0
         return self._steering.ride_s(situation, beliefs, self._limits.RIDE_S)
 
-    def _ask(self, situation: Situation, state: State, beliefs: Beliefs) -> tuple[object, str]:
+    def _ask(
+        self, situation: Situation, state: State, beliefs: Beliefs, load: float
+    ) -> tuple[object, str]:
         """Return the power that mode, state and controller ask for, and who asked."""
         if self._wishes.mode is Mode.OFF:
             return 0.0, "off"
@@ -341,7 +343,7 @@ class Regulator:
         asked = self._steering.decide(situation)
         if not is_finite_number(asked):
             return asked, "control"
-        power, load = float(asked), self._load.at(situation.t_s)  # type: ignore[arg-type]
+        power = float(asked)  # type: ignore[arg-type]
         if state is State.RIDE:
             holding = self._limits.possible(beliefs.holding_power)
             return _up_to(holding, power) + load, "ride"

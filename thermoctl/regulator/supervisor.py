@@ -300,7 +300,8 @@ class Supervisor:
         """
         limits = self.limits
         tolerance = limits.applied_tolerance
-        beyond, window_s = applied - (max(commanded, 0.0) + tolerance), limits.window_s
+        most = (commanded if commanded > 0.0 else 0.0) + tolerance
+        beyond, window_s = applied - most, limits.window_s
         if applied < 0.0 and limits.power_min < 0.0:
             beyond, window_s = min(commanded, 0.0) - tolerance - applied, limits.cooler_window_s
         if math.isfinite(applied):

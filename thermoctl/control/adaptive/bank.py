@@ -341,7 +341,8 @@ class Bank:
 
     def _drifted(self, belief: BankBelief, still: bool, sds: float) -> Drifting:
         """Return the sums after an innovation of `sds` standard deviations."""
-        rest = max(self.hearing.quiet_lags * self._lag(belief), QUIET_SAMPLES)
+        rest = self.hearing.quiet_lags * self._lag(belief)
+        rest = rest if rest > QUIET_SAMPLES else QUIET_SAMPLES
         return belief.drifting.after(still, sds, rest, self.hearing)
 
     def _disturbed(

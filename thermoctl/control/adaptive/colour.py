@@ -69,7 +69,8 @@ class Colour(NamedTuple):
         if nu * nu > _MOST * _MOST * square:
             limit = _MOST * math.sqrt(max(square, LEAST_K2))
             nu = clamp(nu, -limit, limit)
-        rate = 1.0 / min(n + _FIRST, hearing.colour_samples)
+        kept, most_kept = n + _FIRST, hearing.colour_samples
+        rate = 1.0 / (kept if kept < most_kept else most_kept)
         mean_k += (nu - mean_k) * rate
         product += (nu * last_k - product) * rate
         square += (nu * nu - square) * rate

@@ -123,6 +123,8 @@ class Adaptive:
     hearing: Hearing = field(default_factory=Hearing)
     pace: Pace = field(default_factory=Pace)
     bank: Bank = field(init=False, repr=False, compare=False)
+    _sign: float = field(init=False, repr=False, compare=False)
+    """+1 or -1: to a lone cooler everything looks upside down, but for its power."""
 
     name: ClassVar[str] = "adaptive"
 
@@ -133,11 +135,7 @@ class Adaptive:
         u_min = -self.cooling_ratio if self.action == "heat-cool" else 0.0
         bank = Bank(self.period_s, u_min, 1.0, self.lags, self.plants, self.hearing)
         object.__setattr__(self, "bank", bank)
-
-    @property
-    def _sign(self) -> float:
-        """+1 or -1: to a lone cooler everything looks upside down, but for its power."""
-        return -1.0 if self.action == "cool" else 1.0
+        object.__setattr__(self, "_sign", -1.0 if self.action == "cool" else 1.0)
 
     def start(self) -> AdaptiveBelief:
         """Return the belief before the first sample: nothing is known."""

@@ -26,7 +26,7 @@ NOISE_MIN_K2 = 1e-5
 """Least variance of the noise in K², 3 mK: the model is no better than that."""
 _SPREAD = 6.0  # variance of y - 2 y1 + y2 in units of the noise's: 1 + 4 + 1
 _MOST = 9.0  # a second difference counts as three standard deviations at most
-_MEMORY = 0.005  # of 200 samples
+_MEMORY, _SETTLED = 0.005, 195  # of 200 samples; from the sample on that has as many before it
 NEARER = 0.9
 """Share of the way from the coldest reading that counts. Radiation, vapour and walls that warm let
 a loss grow faster than in proportion, as if the surroundings were nearer."""
@@ -87,16 +87,19 @@ class Noise(NamedTuple):
         variance, last_c, before_last_c, n, step_k, repeats, least, colour, coldest_c = self
         if n >= 2:
             second = y_c - 2.0 * last_c + before_last_c
-            square = min(second * second / _SPREAD, _MOST * max(variance, NOISE_START_K2))
-            variance += (square - variance) * max(_MEMORY, 1.0 / (n + 5.0))
+            square = second * second / _SPREAD
+            most = _MOST * (variance if variance > NOISE_START_K2 else NOISE_START_K2)
+            rate = _MEMORY if n >= _SETTLED else 1.0 / (n + 5.0)
+            variance += ((square if square < most else most) - variance) * rate
             if y_c < coldest_c:
                 coldest_c = min(coldest_c, max(y_c, last_c, before_last_c))
-        moved_k = abs(y_c - last_c)
+        moved_k, news = abs(y_c - last_c), False
         if moved_k == 0.0:
+            news = not repeats
             repeats = True
         elif moved_k < step_k:
-            step_k = moved_k
-        if repeats and step_k < hearing.noise_most_k:
+            news, step_k = True, moved_k
+        if news and repeats and step_k < hearing.noise_most_k:
             least = max(step_k * step_k / _ROUNDED, NOISE_MIN_K2)
         if n >= GATE_SAMPLES and abs(nu) < hearing.noise_most_k:
             colour = colour.after(nu, variance, hearing)
@@ -122,7 +125,8 @@ class Noise(NamedTuple):
     @property
     def believed(self) -> float:
         """The variance that filters are told, R of their equations."""
-        return max(self.variance, self.least) + self.colour.variance
+        variance, least = self.variance, self.least
+        return (variance if variance > least else least) + self.colour.variance
 
 
 UNHEARD = Noise()
@@ -152,8 +156,11 @@ class Excitation(NamedTuple):
         """Return that after a period of `power`; the mean is of `memory_s` at least."""
         away, dead = power - self.mean_power, hearing.dead_zone
         share = clamp((abs(away) - dead) / dead, 0.0, 1.0)
-        moved = period_s / max(memory_s, hearing.memory_s, period_s) * away
-        return Excitation(self.mean_power + moved, share)
+        if memory_s < hearing.memory_s:
+            memory_s = hearing.memory_s
+        if memory_s < period_s:
+            memory_s = period_s
+        return Excitation(self.mean_power + period_s / memory_s * away, share)
 
 
 # -- outliers and jumps ---------------------------------------------------------------------------
@@ -248,8 +255,9 @@ class Drifting(NamedTuple):
         disturbed = self.disturbed and calm < rest
         if calm < rest and not disturbed:
             return Drifting(calm, silent_until=self.silent_until)
-        above, below = max(self.above + nu - DRIFTS, 0.0), max(self.below - nu - DRIFTS, 0.0)
-        most = max(above, below)
+        above, below = self.above + nu - DRIFTS, self.below - nu - DRIFTS
+        above, below = above if above > 0.0 else 0.0, below if below > 0.0 else 0.0
+        most = above if above > below else below
         suspected, found = most > hearing.suspected_sds, most > hearing.drifted_sds
         return Drifting(calm, above, below, self.silent_until, disturbed, suspected, found)
 

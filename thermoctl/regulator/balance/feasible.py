@@ -8,7 +8,7 @@ seconds, so that a sample costs next to nothing.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from thermoctl.quantities import Uncertain, clamp
 from thermoctl.regulator.alarms import AlarmRegister
@@ -40,8 +40,9 @@ UNSEEN_S = 60.0
 FAILED = "balance.failed"
 
 
-class Gathered(NamedTuple):
-    """Sums over a stretch that is not complete."""
+@dataclass(slots=True)
+class Gathered:
+    """Sums over a stretch; open to be added to, for a new one every sample takes longer."""
 
     span_s: float = 0.0
     heat_s: float = 0.0
@@ -128,18 +129,15 @@ class Feasibility:
         self._heat += share * (warming - self._heat)
         asked = applied - beyond
         self._asked += share * ((asked if asked < warming else warming) - self._asked)
-        heat, seen = self._heat, reading_c == reading_c
-        if seen:
+        heat, sums = self._heat, self._gathered
+        sums.span_s += interval_s
+        sums.heat_s += interval_s * heat
+        sums.late_s += interval_s * (abs(warming - heat) + warming - applied)
+        if reading_c == reading_c:
             self._reading_c = reading_c
-        span_s, heat_s, late_s, total_c, readings = self._gathered
-        self._gathered = Gathered(
-            span_s + interval_s,
-            heat_s + interval_s * heat,
-            late_s + interval_s * (abs(warming - heat) + warming - applied),
-            total_c + reading_c if seen else total_c,
-            readings + seen,
-        )
-        return self._gathered.span_s >= STRETCH_S
+            sums.total_c += reading_c
+            sums.readings += 1
+        return sums.span_s >= STRETCH_S
 
     def forget(self) -> None:
         """Begin anew, with nothing known."""

@@ -56,7 +56,9 @@ class StuckSensor:
         """Learn from a reading that moved, and from the equal ones before it."""
         count = self._run + 1
         self._seen += count
-        share = min(max(self.MEMORY, 1.0 / self._seen) * count, 1.0)
+        newest = 1.0 / self._seen
+        share = (newest if newest > self.MEMORY else self.MEMORY) * count
+        share = share if share < 1.0 else 1.0
         self._equal += share * (self._run / count - self._equal)
         self._turns += share * (turned / count - self._turns)
 
