@@ -2,15 +2,21 @@
 
 import copy
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import pytest
 
 from thermoctl.app.compose import regulator_for
 from thermoctl.app.settings import load
 from thermoctl.regulator import Regulator
+from thermoctl.regulator.heater.check import HeaterCheck
+from thermoctl.regulator.heater.watch import HeaterWatch
+from thermoctl.regulator.limits import Limits
+from thermoctl.regulator.supervisor import Supervisor
 from thermoctl.signals import Measurement, Quality, State, Step
 
 LOOP = {"setpoint_c": 37.5, "trip_above_c": 60.0, "trip_below_c": 0.0, "mode": "auto"}
@@ -80,3 +86,50 @@ def held() -> Drive:
 def warm(held: Drive) -> Drive:
     """A regulator that has held its set point for five minutes."""
     return copy.deepcopy(held)
+
+
+class Vessel:
+    """A watch over what loses more the hotter it is.
+
+    `shows` is what is read of it, `left` the share of the heater that is left at a temperature, and
+    `poured` the share of the water for which cold water comes in a second.
+    """
+
+    def __init__(self, gain=0.02, cools_per_s=4e-4, lag_s=20.0, seed=1, **check):
+        self.gain, self.cools_per_s, self.pole_s = gain, cools_per_s, 0.5 * lag_s
+        self.events = deque()
+        self.supervisor = Supervisor(Limits(200.0, -50.0, -50.0, 200.0), self.emit)
+        self.watch = HeaterWatch(HeaterCheck(**check), 1.0, self.supervisor, self.emit)
+        self.rng, self.shows = np.random.default_rng(seed), lambda water_c: water_c
+        self.left, self.poured = lambda water_c: 1.0, lambda t_s: 0.0
+        self.t_s, self.water_c, self.applied, self.given_s = 0.0, 20.0, 0.0, 0.0
+        self.first = self.second = 0.0
+
+    def emit(self, name, **fields):
+        self.events.append(name)
+
+    def names(self):
+        return [name for name in self.events if name.startswith("heater.")]
+
+    def run(self, seconds):
+        """Give full power wherever nobody forbids it."""
+        for _ in range(round(seconds)):
+            self.first += (self.applied - self.first) / self.pole_s
+            self.second += (self.first - self.second) / self.pole_s
+            self.water_c += self.gain * self.second * self.left(self.water_c)
+            self.water_c -= self.cools_per_s * (self.water_c - 20.0)
+            self.water_c -= self.poured(self.t_s) * (self.water_c - 5.0)
+            self.t_s += 1.0
+            reading_c = self.shows(self.water_c) + 0.01 * self.rng.standard_normal()
+            self.supervisor.judge(Measurement(self.t_s, reading_c), self.t_s, 1.0)
+            self.watch.observe(self.t_s, 1.0, reading_c, self.applied)
+            runs = self.supervisor.rule(self.t_s, 0.0) is State.RUN
+            self.applied = float(runs and not self.watch.asks)
+            self.given_s += self.applied
+        return self
+
+
+@pytest.fixture
+def vessel_with() -> Callable[..., Vessel]:
+    """Return what makes a `Vessel`."""
+    return Vessel

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from thermoctl.regulator.heater.blocks import NEARLY_FULL, Block
-from thermoctl.regulator.heater.check import HeaterCheck
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen, clear_k
 from thermoctl.regulator.heater.standing import (
     ANSWERED_S,
@@ -15,10 +14,7 @@ from thermoctl.regulator.heater.standing import (
     STILL_K,
     Standing,
 )
-from thermoctl.regulator.heater.watch import HeaterWatch
-from thermoctl.regulator.limits import Limits
-from thermoctl.regulator.supervisor import Supervisor
-from thermoctl.signals import Measurement, State
+from thermoctl.signals import State
 
 BLOCK_S, NOISE_K, WEAKEST = 4.0, 0.005, 9e-4
 PLACES = len(LAGS_S)
@@ -97,54 +93,13 @@ def test_less_power_begins_the_stretch_anew():
     assert standing.question(known, WEAKEST, now, NOISE_K, answered=False) is None
 
 
-class Vessel:
-    """A watch over what loses more the hotter it is.
-
-    `shows` is what is read of it, `left` the share of the heater that is left at a temperature, and
-    `poured` the share of the water for which cold water comes in a second.
-    """
-
-    def __init__(self, gain=0.02, cools_per_s=4e-4, lag_s=20.0, seed=1, **check):
-        self.gain, self.cools_per_s, self.pole_s = gain, cools_per_s, 0.5 * lag_s
-        self.events = deque()
-        self.supervisor = Supervisor(Limits(200.0, -50.0, -50.0, 200.0), self.emit)
-        self.watch = HeaterWatch(HeaterCheck(**check), 1.0, self.supervisor, self.emit)
-        self.rng, self.shows = np.random.default_rng(seed), lambda water_c: water_c
-        self.left, self.poured = lambda water_c: 1.0, lambda t_s: 0.0
-        self.t_s, self.water_c, self.applied, self.given_s = 0.0, 20.0, 0.0, 0.0
-        self.first = self.second = 0.0
-
-    def emit(self, name, **fields):
-        self.events.append(name)
-
-    def names(self):
-        return [name for name in self.events if name.startswith("heater.")]
-
-    def run(self, seconds):
-        """Give full power wherever nobody forbids it."""
-        for _ in range(round(seconds)):
-            self.first += (self.applied - self.first) / self.pole_s
-            self.second += (self.first - self.second) / self.pole_s
-            self.water_c += self.gain * self.second * self.left(self.water_c)
-            self.water_c -= self.cools_per_s * (self.water_c - 20.0)
-            self.water_c -= self.poured(self.t_s) * (self.water_c - 5.0)
-            self.t_s += 1.0
-            reading_c = self.shows(self.water_c) + 0.01 * self.rng.standard_normal()
-            self.supervisor.judge(Measurement(self.t_s, reading_c), self.t_s, 1.0)
-            self.watch.observe(self.t_s, 1.0, reading_c, self.applied)
-            runs = self.supervisor.rule(self.t_s, 0.0) is State.RUN
-            self.applied = float(runs and not self.watch.asks)
-            self.given_s += self.applied
-        return self
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("gain", "cools_per_s", "lag_s"),
     [(0.02, 4e-4, 20.0), (0.005, 2e-4, 60.0), (0.15, 4e-3, 10.0), (0.002, 2e-4, 40.0)],
 )
-def test_a_vessel_at_its_limit_answers_and_goes_on(gain, cools_per_s, lag_s):
-    vessel = Vessel(gain, cools_per_s, lag_s).run(20 * 3600)
+def test_a_vessel_at_its_limit_answers_and_goes_on(vessel_with, gain, cools_per_s, lag_s):
+    vessel = vessel_with(gain, cools_per_s, lag_s).run(20 * 3600)
     assert set(vessel.names()) == {"heater.questioned", "heater.answered"}
     assert vessel.given_s > 0.97 * vessel.t_s
     assert vessel.supervisor.state is State.RUN
@@ -154,9 +109,9 @@ def test_a_vessel_at_its_limit_answers_and_goes_on(gain, cools_per_s, lag_s):
 @pytest.mark.parametrize("from_c", [20.0, 30.0], ids=["jacket", "ptc"])
 @pytest.mark.parametrize("cools_per_s", [5e-5, 2e-4])
 def test_a_heater_that_gives_less_the_hotter_its_vessel_is_answers_at_its_limit(
-    from_c, cools_per_s
+    vessel_with, from_c, cools_per_s
 ):
-    vessel = Vessel(0.02, cools_per_s, 10.0, weakest_k_per_s=9e-4)
+    vessel = vessel_with(0.02, cools_per_s, 10.0, weakest_k_per_s=9e-4)
     vessel.left = lambda water_c: min(max((55.0 - water_c) / (55.0 - from_c), 0.0), 1.0)
     vessel.run(6 * 3600)
     assert set(vessel.names()) == {"heater.questioned", "heater.answered"}
@@ -165,9 +120,9 @@ def test_a_heater_that_gives_less_the_hotter_its_vessel_is_answers_at_its_limit(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("share", "every_s"), [(0.03, 300.0), (0.03, 600.0)])
-def test_cold_portions_at_a_limit_condemn_no_heater(share, every_s):
+def test_cold_portions_at_a_limit_condemn_no_heater(vessel_with, share, every_s):
     for seed in range(4):
-        vessel = Vessel(0.006, 3.3e-4, 6.0, seed, weakest_k_per_s=9e-4)
+        vessel = vessel_with(0.006, 3.3e-4, 6.0, seed, weakest_k_per_s=9e-4)
         vessel.poured = lambda t_s: share / 40.0 if t_s % every_s < 40.0 else 0.0
         vessel.run(4 * 3600)
         assert set(vessel.names()) <= {"heater.questioned", "heater.answered"}, seed
@@ -176,9 +131,9 @@ def test_cold_portions_at_a_limit_condemn_no_heater(share, every_s):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 4])
-def test_air_that_warmed_like_a_heater_is_told_once_it_stands(seed):
+def test_air_that_warmed_like_a_heater_is_told_once_it_stands(vessel_with, seed):
     """By then all the heat counts as lost, and the air wanders by a fiftieth of a kelvin."""
-    vessel, rng = Vessel(seed=seed, weakest_k_per_s=9e-4), np.random.default_rng(100 + seed)
+    vessel, rng = vessel_with(seed=seed, weakest_k_per_s=9e-4), np.random.default_rng(100 + seed)
     off_k = deque([0.0], maxlen=1)
 
     def shows(_):

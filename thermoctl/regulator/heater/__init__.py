@@ -8,9 +8,10 @@ the reading does. `check` has its settings; `led` watches a block that another l
 - `response` learns gain and lag of the heater by regression, `past` what was before a start, and
   `known` keeps what may be relied on.
 - `doubt` holds readings against that model, `climb` against the last rise, `ceiling` knows the
-  temperature that a plant does not pass, `silence` adds up heat that nothing follows, and
-  `standing` looks at readings that full power has not raised for long. `trial` gives an unknown
-  heater its time to show a rise, and `account` holds all its heat against what came of it.
+  temperature that a plant does not pass, `silence` adds up heat that nothing follows, `standing`
+  looks at readings that full power has not raised for long, and `unbroken` at full power that was
+  never less. `trial` gives an unknown heater its time to show a rise, and `account` holds all its
+  heat against what came of it.
 - `rising` tells which rises without power prove that it is stuck on.
 - `cut` is a question that is being put, `question` the regression that reads the answer, `evidence`
   weighs loads against faults, `balance` knows what a plant loses under one, `fall` a fall that no

@@ -26,6 +26,8 @@ class Cut(NamedTuple):
         Whether nobody is told yet: the next heat was announced as the question.
     stands : bool
         Whether the plant may be at what it can reach, where little is left of its gain.
+    routine : bool
+        Whether nothing is in doubt: an answer that stays open is left open.
     """
 
     at_s: float
@@ -37,3 +39,4 @@ class Cut(NamedTuple):
     portion: bool = False
     quiet: bool = False
     stands: bool = False
+    routine: bool = False

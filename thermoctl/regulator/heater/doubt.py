@@ -248,7 +248,8 @@ class HeatDoubt:
         full_k = gain.mean * span_s
         self._cool(gain, span_s, now.reading_c)
         loss_k = (self.loss(gain) + self._unseen(gain, now.reading_c)) * span_s
-        self._silence.add(gain, block, before, now, loss_k * self._lost_there(now.reading_c))
+        lost_k = loss_k * self._lost_there(now.reading_c)
+        self._silence.add(gain, block, before, now, lost_k, proven=proven)
         self._answered_s -= span_s
         large = proven and self._answered_s <= 0.0 and loss_k > MUCH_SHARE * full_k
         missing_k = self._missing_k - FULL_SHARE * full_k

@@ -27,6 +27,8 @@ LEFT, LEFT_SURE = 0.15, 2.0
 """Share of its gain that is left to a heater at what its plant can reach: a jacket, a PTC element
 or a compressor gives less the nearer it comes, and without it a plant that is well insulated cools
 by as little. And the least number of standard deviations by which so little is an answer."""
+RECENT_S = 60.0
+"""Time before a cut that nothing gave rise to, in s, in which there is seldom a load."""
 RISES_SDS = 5.0
 """Standard deviations of a reading by which it has risen."""
 SHOWS = "{:.0f} s without power show a gain of {:.2g} K/s"
@@ -62,6 +64,12 @@ def tells(answer: Answer, asked_s: float, lag_s: float) -> bool:
     return asked_s >= BAD_LAGS * lag_s and answer in (Answer.NOTHING, Answer.COOLS)
 
 
+def longest_s(cut: Cut, known: Gain, sd_k: float) -> float:
+    """Return how long the answer of a known heater is waited for."""
+    usual_s = question.longest_s(known, sd_k)
+    return max(question.ROUTINE_S, usual_s) if cut.routine else usual_s
+
+
 def answer(
     rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float, sure: float = question.SURE
 ) -> tuple[Answer, Gain]:
@@ -80,6 +88,8 @@ def answer(
     sure : float
         Standard deviations by which an answer has to differ from nothing.
     """
+    if cut.routine:
+        return _of_routine(rows, cut, known, sd_k, late=sure < question.SURE)
     least = known
     if cut.stands:
         least, sure = known._replace(mean=LEFT * known.mean), max(sure, LEFT_SURE)
@@ -112,7 +122,31 @@ def _still_rises(rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float) -> 
     """Return whether the reading goes on rising, which no cut of a sound heater lets it do."""
     last_s = max(row.t_s for row in rows)
     from_s = max(cut.at_s, last_s - max(OFF_LAGS * known.lag_s, question.BEFORE_S))
+    if cut.routine:  # of a weak heater a few readings tell nothing
+        from_s = min(from_s, 0.5 * (cut.at_s + last_s))
     return question.slope(rows, from_s, less_sd_k=sd_k) > RISES * known.mean
+
+
+def _of_routine(
+    rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float, *, late: bool
+) -> tuple[Answer, Gain]:
+    """Return the answer where nothing is in doubt; what stays open is left open in the end.
+
+    What is known was told under full power alone, and may be far off, lag and all. A good answer
+    may be one by readings around the cut: some minutes before it cold water may have come.
+    """
+    weakest, recent_s = LEFT * question.ANSWERS * known.mean, cut.at_s - RECENT_S
+    for from_s in (recent_s, cut.from_s):
+        found, shown = question.of_unknown_rows(rows, (from_s,), cut.at_s, weakest, sd_k)
+        if found is Answer.HEATS and not _still_rises(rows, cut, known, sd_k):
+            return found, shown
+    if found is Answer.COOLS and shown.mean < -question.ANSWERS * known.mean:
+        return found, shown
+    if not late:
+        return Answer.OPEN, shown
+    weakest = question.ANSWERS * known.mean
+    found, shown = question.of_unknown_rows(rows, (cut.from_s,), cut.at_s, weakest, sd_k)
+    return Answer.NOTHING if found is Answer.NOTHING else Answer.HIDDEN, shown
 
 
 def _nothing_came(rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float) -> bool:

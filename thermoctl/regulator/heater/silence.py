@@ -23,6 +23,7 @@ from thermoctl.regulator.heater.cut import Cut
 from thermoctl.regulator.heater.question import BEFORE_LAGS, BEFORE_S
 from thermoctl.regulator.heater.response import Gain, Seen
 from thermoctl.regulator.heater.standing import Standing
+from thermoctl.regulator.heater.unbroken import Unbroken
 
 STRONG_K_PER_S = 0.1
 """Least gain in K/s of a heater that is meant: weaker ones are asked in time by `doubt`."""
@@ -68,7 +69,7 @@ class Silence:
 
     def __init__(self) -> None:
         self._fell_k = 0.0
-        self._standing = Standing()
+        self._standing, self._unbroken = Standing(), Unbroken()
         self.clear()
 
     def clear(self) -> None:
@@ -81,13 +82,27 @@ class Silence:
         self._falls: Seen | None = None
         self._given_k = 0.0
         self._standing.clear()
+        self._unbroken.clear()
 
-    def add(self, gain: Gain, block: Block, before: Seen, now: Seen, loss_k: float) -> None:
-        """Take in a block, from `before` to `now`, in which the plant loses `loss_k`."""
+    def add(
+        self,
+        gain: Gain,
+        block: Block,
+        before: Seen,
+        now: Seen,
+        loss_k: float,
+        *,
+        proven: bool = True,
+    ) -> None:
+        """Take in a block, from `before` to `now`, in which the plant loses `loss_k`.
+
+        A heater that is `proven` was seen to obey less power.
+        """
         span_s, rise_k = now.t_s - before.t_s, now.reading_c - before.reading_c
         heat_k = gain.mean * (now.heat_s[gain.place] - before.heat_s[gain.place])
         full_k = gain.mean * span_s
         self._standing.add(block, before)
+        self._unbroken.add(block, before, proven=proven)
         self._unpaid_k += full_k * block.power - max(rise_k, 0.0) / ANSWERS
         if self._unpaid_k <= 0.0:
             self._unpaid_k, self._paid_s = 0.0, now.t_s
@@ -123,6 +138,7 @@ class Silence:
         """
         if not again:
             stands = self._standing.question(gain, weakest, now, sd_k, answered=answered)
+            stands = stands or self._unbroken.question(gain, now, sd_k)
             if stands is not None:
                 return stands
         if gain.mean < STRONG_K_PER_S:

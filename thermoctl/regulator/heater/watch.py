@@ -298,7 +298,7 @@ class HeaterWatch:
             self._leave_open(asked_s)
         elif answer is not Answer.OPEN:
             self._refuse(answer, cut, shown, asked_s, t_s)
-        elif known is not None and asked_s > question.longest_s(known, block.sd_k):
+        elif known is not None and asked_s > hearing.longest_s(cut, known, block.sd_k):
             answer, shown = self._answer(cut, block.sd_k, question.LIKELY)
             if answer is Answer.HEATS:
                 self._emit("heater.answered", text=hearing.LIKELY.format(asked_s, shown.mean))
@@ -346,7 +346,7 @@ class HeaterWatch:
         """Go on with a heater that heats, and with the gain it has shown if that is news."""
         if (cut := self._cut) is None or not cut.quiet:
             self._emit("heater.answered", text=hearing.told(shown, asked_s, known=self.known))
-        if cut is None or not cut.stands:  # what is left at a limit is no gain
+        if cut is None or not (cut.stands or cut.routine):  # what is left at a limit is no gain
             self._heater.accept(shown, more=cut is None or cut.began_s is None)
         self._trial.settle(self._t_s)
         self._distrusted_k = 0.0
