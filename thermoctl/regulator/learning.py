@@ -119,4 +119,6 @@ class Learning:
 
 def _all_finite(values: Array) -> bool:
     """Return whether every number is finite; plain floats, which add up without a warning."""
+    if values.size == 1:  # one parameter, as in most models
+        return math.isfinite(values.item())
     return math.isfinite(sum(values.ravel().tolist()))

@@ -28,6 +28,7 @@ _EVEN_ODDS, _SAID_ODDS = math.log(1.5), math.log(1000.0)
 """Log odds below which they are called even, and above which 'more than' is all that is said."""
 
 TRUSTED, DROPPED = "model.trusted", "model.dropped"
+_ORIGINS = {TRUSTED: "stored", DROPPED: "dropped", "": "new"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +58,7 @@ class Memory:
         """What the bank that steers began with."""
         if self.rival is not None:
             return "trial"
-        return {TRUSTED: "stored", DROPPED: "dropped"}.get(self.verdict, "new")
+        return _ORIGINS[self.verdict]
 
 
 def observe(
