@@ -1,11 +1,12 @@
 """Full power that has never been less is cut for some minutes, and what is sound answers."""
 
+import numpy as np
 import pytest
 
 from thermoctl.regulator.heater.blocks import NEARLY_FULL, Block
 from thermoctl.regulator.heater.question import LONGEST_SDS, ROUTINE_S
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
-from thermoctl.regulator.heater.unbroken import LONGER, UNBROKEN_S, Unbroken
+from thermoctl.regulator.heater.unbroken import AGAIN_S, LONGER, UNBROKEN_S, Unbroken
 from thermoctl.signals import State
 
 BLOCK_S, NOISE_K = 4.0, 0.01
@@ -35,6 +36,16 @@ def test_it_is_asked_after_two_hours_and_then_ever_more_rarely():
     assert asked == pytest.approx([first, second, third], abs=4.0 * BLOCK_S)
 
 
+def test_after_a_bad_answer_it_is_asked_soon_and_then_as_rarely_as_before():
+    unbroken, at_s = Unbroken(), []
+    unbroken.distrust()
+    for t_s in np.arange(0.0, 2.5 * UNBROKEN_S, BLOCK_S):
+        unbroken.add(Block(BLOCK_S, 1.0, 20.0, NOISE_K), seen(t_s), proven=False)
+        if unbroken.question(KNOWN, seen(t_s + BLOCK_S), NOISE_K) is not None:
+            at_s.append(t_s)
+    assert at_s == pytest.approx([AGAIN_S, AGAIN_S + UNBROKEN_S], abs=4.0 * BLOCK_S)
+
+
 @pytest.mark.parametrize(
     "sound",
     [
@@ -52,7 +63,7 @@ def test_nothing_is_in_doubt_when_it_is_asked():
     unbroken = Unbroken()
     unbroken.add(Block(BLOCK_S, 1.0, 20.0, NOISE_K), seen(0.0), proven=False)
     cut = unbroken.question(KNOWN, seen(UNBROKEN_S, 27.2), NOISE_K)
-    assert cut.routine
+    assert cut.rose == pytest.approx(1e-3)
     assert "120 min and +7.2 K" in cut.why
     assert cut.began_s is None
 

@@ -26,8 +26,9 @@ class Cut(NamedTuple):
         Whether nobody is told yet: the next heat was announced as the question.
     stands : bool
         Whether the plant may be at what it can reach, where little is left of its gain.
-    routine : bool
-        Whether nothing is in doubt: an answer that stays open is left open.
+    rose : float or None
+        How fast the reading rose in K/s, where hours of full power are all there is to ask about:
+        nothing is in doubt then, and an answer that stays open is left open.
     """
 
     at_s: float
@@ -39,4 +40,9 @@ class Cut(NamedTuple):
     portion: bool = False
     quiet: bool = False
     stands: bool = False
-    routine: bool = False
+    rose: float | None = None
+
+    @property
+    def teaches(self) -> bool:
+        """Whether a good answer shows a gain, rather than what is left of one."""
+        return not self.stands and self.rose is None

@@ -147,6 +147,7 @@ class HeatDoubt:
 
         Of too few readings that is NaN, and says nothing.
         """
+        self._silence.distrust()
         if not math.isnan(fell):
             self._rise_rate += max(self.loss(gain) - max(fell, 0.0), 0.0)
 

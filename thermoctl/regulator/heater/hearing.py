@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from thermoctl.quantities import clamp
 from thermoctl.regulator.heater import evidence, question
 from thermoctl.regulator.heater.balance import brought_back
 from thermoctl.regulator.heater.cut import Cut
@@ -66,8 +67,7 @@ def tells(answer: Answer, asked_s: float, lag_s: float) -> bool:
 
 def longest_s(cut: Cut, known: Gain, sd_k: float) -> float:
     """Return how long the answer of a known heater is waited for."""
-    usual_s = question.longest_s(known, sd_k)
-    return max(question.ROUTINE_S, usual_s) if cut.routine else usual_s
+    return question.longest_s(known, sd_k) if cut.rose is None else question.ROUTINE_S
 
 
 def answer(
@@ -88,7 +88,7 @@ def answer(
     sure : float
         Standard deviations by which an answer has to differ from nothing.
     """
-    if cut.routine:
+    if cut.rose is not None:
         return _of_routine(rows, cut, known, sd_k, late=sure < question.SURE)
     least = known
     if cut.stands:
@@ -120,11 +120,13 @@ def unasked(rows: Collection[Seen], since_s: float, known: Gain, sd_k: float) ->
 
 def _still_rises(rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float) -> bool:
     """Return whether the reading goes on rising, which no cut of a sound heater lets it do."""
-    last_s = max(row.t_s for row in rows)
+    last_s, most = max(row.t_s for row in rows), known.mean
     from_s = max(cut.at_s, last_s - max(OFF_LAGS * known.lag_s, question.BEFORE_S))
-    if cut.routine:  # of a weak heater a few readings tell nothing
-        from_s = min(from_s, 0.5 * (cut.at_s + last_s))
-    return question.slope(rows, from_s, less_sd_k=sd_k) > RISES * known.mean
+    if (
+        cut.rose is not None
+    ):  # a gain that was overstated; of a weak one a few readings tell nothing
+        from_s, most = min(from_s, 0.5 * (cut.at_s + last_s)), clamp(cut.rose, 0.0, most)
+    return question.slope(rows, from_s, less_sd_k=sd_k) > RISES * most
 
 
 def _of_routine(

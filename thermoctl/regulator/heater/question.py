@@ -51,7 +51,7 @@ LONGEST_S, LONGEST_LAGS, LONGEST_SDS = 240.0, 12.0, 20.0
 """Longest wait for the answer of a known heater: in s, in lags, and in standard deviations of a
 reading over the gain, the longest of the three."""
 ROUTINE_S = 1200.0
-"""The same, at least, where nothing is in doubt: what is sound answers sooner."""
+"""The same where nothing is in doubt: what is sound answers sooner."""
 LIKELY = 1.0
 """Standard deviations after that wait above which a gain clears the heater: noise hides the answer,
 and the likelier of the two is taken."""

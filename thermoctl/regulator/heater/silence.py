@@ -161,6 +161,10 @@ class Silence:
         began_s = None if moved else since.t_s
         return Cut(now.t_s, max(from_s, since.t_s), why, moved and not again, began_s)
 
+    def distrust(self) -> None:
+        """Go on after a bad answer."""
+        self._unbroken.distrust()
+
     def fell(self, gain: Gain, sd_k: float) -> bool:
         """Return whether the reading fell as no heater makes it, and has not come back."""
         return gain.mean >= STRONG_K_PER_S and self._fell_k > _least_k(gain, sd_k)

@@ -8,13 +8,15 @@ rising does not tell the two apart; a cut of some minutes does.
 
 from __future__ import annotations
 
+from thermoctl.quantities import clamp
 from thermoctl.regulator.heater.blocks import NEARLY_FULL, Block
 from thermoctl.regulator.heater.cut import Cut
-from thermoctl.regulator.heater.question import CREPT_LAGS, LONGEST_S, LONGEST_SDS, ROUTINE_S
+from thermoctl.regulator.heater.question import LONGEST_S, LONGEST_SDS, ROUTINE_S
 from thermoctl.regulator.heater.response import Gain, Seen
 
-UNBROKEN_S, LONGER = 7200.0, 2.0
-"""Time in s under nearly full power until it is asked, and its factor from then on."""
+UNBROKEN_S, LONGER, AGAIN_S = 7200.0, 2.0, 900.0
+"""Time in s under nearly full power until it is asked, its factor from then on, and that time after
+a bad answer."""
 
 
 class Unbroken:
@@ -27,6 +29,10 @@ class Unbroken:
     def clear(self) -> None:
         """Begin anew."""
         self._from: Seen | None = None
+
+    def distrust(self) -> None:
+        """Ask soon, after a bad answer."""
+        self._least_s = AGAIN_S
 
     def add(self, block: Block, before: Seen, *, proven: bool) -> None:
         """Take in a block that began with `before`, of a heater that has obeyed or not."""
@@ -43,8 +49,9 @@ class Unbroken:
         self.clear()
         if gain.mean * ROUTINE_S < LONGEST_SDS * sd_k:
             return None
-        self._least_s *= LONGER
-        rise_k, minutes = now.reading_c - start.reading_c, (now.t_s - start.t_s) / 60.0
-        why = f"expected less power once, got full power for {minutes:.0f} min and {rise_k:+.1f} K"
-        before_s = max(CREPT_LAGS * gain.lag_s, LONGEST_S, LONGEST_SDS * sd_k / gain.mean)
-        return Cut(now.t_s, now.t_s - before_s, why, routine=True)
+        self._least_s = max(LONGER * self._least_s, UNBROKEN_S)
+        rise_k, span_s = now.reading_c - start.reading_c, now.t_s - start.t_s
+        got = f"full power for {span_s / 60.0:.0f} min and {rise_k:+.1f} K"
+        before_s = clamp(LONGEST_SDS * sd_k / gain.mean, LONGEST_S, 0.5 * ROUTINE_S)
+        why = f"expected less power once, got {got}"
+        return Cut(now.t_s, now.t_s - before_s, why, rose=rise_k / span_s)

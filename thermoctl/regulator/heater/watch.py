@@ -346,7 +346,7 @@ class HeaterWatch:
         """Go on with a heater that heats, and with the gain it has shown if that is news."""
         if (cut := self._cut) is None or not cut.quiet:
             self._emit("heater.answered", text=hearing.told(shown, asked_s, known=self.known))
-        if cut is None or not (cut.stands or cut.routine):  # what is left at a limit is no gain
+        if cut is None or cut.teaches:
             self._heater.accept(shown, more=cut is None or cut.began_s is None)
         self._trial.settle(self._t_s)
         self._distrusted_k = 0.0
