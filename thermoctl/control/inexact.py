@@ -46,7 +46,7 @@ class Inexact(NamedTuple):
             off = 0.0
         if abs(off) <= INEXACT:
             share = situation.interval_s / INEXACT_S
-            more += (off - more) * (share if share < 1.0 else 1.0)
+            more += (off - more) * (1.0 if share > 1.0 else share)
         return Inexact(more, pulses_s)
 
     def made_up_for(self, power: float) -> float:
@@ -57,7 +57,7 @@ class Inexact(NamedTuple):
         """
         exact = power - self.more
         if power > 0.0:
-            return exact if exact > 0.0 else 0.0
+            return 0.0 if exact < 0.0 else exact
         return min(exact, 0.0) if power < 0.0 else power
 
 

@@ -180,7 +180,7 @@ class Guarded:
         sd = NORMAL_SD * memory.ranked[len(memory.ranked) // 2]
         least = R2_FLOOR * law.R2 if self.R2_min is None else self.R2_min
         R2 = sd * sd
-        R2 = R2 if least < R2 else least
+        R2 = least if least > R2 else R2
         return law if R2 == law.R2 else replace(law, R2=clamp(R2, 1.0 / LARGEST, LARGEST))
 
     def _remembered(self, memory: _Memory | None, rows: Array, phi: Array, y: float) -> _Memory:

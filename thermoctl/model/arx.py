@@ -204,7 +204,7 @@ class KnownGain:
     def pole(self, theta: Array, P: Array) -> tuple[float | None, float | None]:
         """Return a and its standard deviation."""
         variance = float(P[0, 0])
-        return float(theta[0]), math.sqrt(variance) if variance > 0.0 else 0.0
+        return float(theta[0]), math.sqrt(0.0 if variance < 0.0 else variance)
 
 
 def _require_positive(name: str, value: float) -> None:

@@ -34,7 +34,7 @@ class Holding(NamedTuple):
         power, held_s = self
         held_s += interval_s
         share = interval_s / (held_s if held_s < MEMORY_S else MEMORY_S)
-        share = share if share < 1.0 else 1.0
+        share = 1.0 if share > 1.0 else share
         return Holding(power + share * (applied - power), held_s)
 
     @property

@@ -300,7 +300,7 @@ class Supervisor:
         """
         limits = self.limits
         tolerance = limits.applied_tolerance
-        most = (commanded if commanded > 0.0 else 0.0) + tolerance
+        most = (0.0 if commanded < 0.0 else commanded) + tolerance
         beyond, window_s = applied - most, limits.window_s
         if applied < 0.0 and limits.power_min < 0.0:
             beyond, window_s = min(commanded, 0.0) - tolerance - applied, limits.cooler_window_s

@@ -1,5 +1,7 @@
 """Full power that has never been less is cut for some minutes, and what is sound answers."""
 
+from collections import deque
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from thermoctl.regulator.heater.blocks import NEARLY_FULL, Block
 from thermoctl.regulator.heater.question import LONGEST_SDS, ROUTINE_S
 from thermoctl.regulator.heater.response import LAGS_S, Gain, Seen
 from thermoctl.regulator.heater.unbroken import AGAIN_S, LONGER, UNBROKEN_S, Unbroken
+from thermoctl.regulator.heater.verdicts import LATELY_S
 from thermoctl.signals import State
 
 BLOCK_S, NOISE_K = 4.0, 0.01
@@ -81,6 +84,21 @@ def test_a_vessel_that_warms_for_hours_answers(vessel_with, gain, cools_per_s, l
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("wall_s", [200.0, 400.0])
+def test_a_wall_that_gives_off_its_heat_for_longer_than_any_lag_is_no_fault(vessel_with, wall_s):
+    vessel, wall_c = vessel_with(3e-3, 1e-5, 10.0, first_heat_s=1800.0), deque([20.0], maxlen=1)
+
+    def shows(water_c):
+        wall_c.append(wall_c[0] + (water_c - wall_c[0]) / wall_s)
+        return wall_c[0]
+
+    vessel.shows = shows
+    vessel.run(4 * 3600)
+    assert set(vessel.names()) == {"heater.questioned", "heater.answered"}
+    assert vessel.supervisor.state is State.RUN
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_air_that_warms_for_ever_as_a_heater_would_is_told(vessel_with, seed):
     """In step with full power from the second hour on, it is a known heater by then."""
@@ -90,3 +108,4 @@ def test_air_that_warms_for_ever_as_a_heater_would_is_told(vessel_with, seed):
     )
     vessel.run(4 * 3600)
     assert vessel.supervisor.state is State.LATCHED
+    assert vessel.given_s < UNBROKEN_S + LATELY_S

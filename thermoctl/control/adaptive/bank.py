@@ -342,7 +342,7 @@ class Bank:
     def _drifted(self, belief: BankBelief, still: bool, sds: float) -> Drifting:
         """Return the sums after an innovation of `sds` standard deviations."""
         rest = self.hearing.quiet_lags * self._lag(belief)
-        rest = rest if rest > QUIET_SAMPLES else QUIET_SAMPLES
+        rest = QUIET_SAMPLES if rest < QUIET_SAMPLES else rest
         return belief.drifting.after(still, sds, rest, self.hearing)
 
     def _disturbed(

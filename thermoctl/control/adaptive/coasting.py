@@ -146,7 +146,7 @@ def _coming(
     coasting *= coasting
     variance = float(mean(coasting)) - coasting_c * coasting_c
     surplus = float(mean(path.heat)) - holding_power
-    return coasting_c, holding_power, surplus, math.sqrt(variance) if variance > 0.0 else 0.0
+    return coasting_c, holding_power, surplus, math.sqrt(0.0 if variance < 0.0 else variance)
 
 
 def power_for(
@@ -187,8 +187,8 @@ def power_for(
     doubt_k = outlook.gain * math.hypot(outlook.lag_sd_s, floor_s)
     heavy = clamp(doubt_k / pace.mistaken_k, 1.0, pace.calmer)
     fastest_s, Tc_s = pace.fastest_periods * period_s, calmness * heavy * outlook.lag_s
-    fastest_s = fastest_s if fastest_s > pace.fastest_s else pace.fastest_s
-    Tc_s = Tc_s if Tc_s > fastest_s else fastest_s
+    fastest_s = pace.fastest_s if fastest_s < pace.fastest_s else fastest_s
+    Tc_s = fastest_s if Tc_s < fastest_s else Tc_s
     tau_s = pace.smoothness * Tc_s
     resting = outlook.holding_power + ramp_power
     aim_c = outlook.coasting_c + outlook.gain * tau_s * (before - resting)
@@ -197,9 +197,9 @@ def power_for(
     aim_c += outlook.heater_k * (_counted(surplus, swing_k, pace) - surplus)
     error_k = _agreed(setpoint_c - aim_c, outlook.spread_k, bounds, pace)
     gain_sd, gain = outlook.gain_sd, outlook.gain
-    vague = gain_sd if gain_sd < pace.vague_k_per_s else pace.vague_k_per_s
+    vague = pace.vague_k_per_s if pace.vague_k_per_s < gain_sd else gain_sd
     vague -= pace.vague_share * gain
-    gain = gain + vague if vague > 0.0 else gain
+    gain = gain if vague < 0.0 else gain + vague
     keeps = kept_s > 0.0 and error_k > 0.0
     if keeps:  # power above the resting one is heat for as long as it takes to come down
         Tc_s += kept_s
@@ -217,8 +217,8 @@ def _counted(surplus: float, swing_k: float, pace: Pace) -> float:
     """
     heavy, size = clamp(swing_k / pace.heavy_k, 1.0, pace.calmer), abs(surplus)
     moving = (1.0 + pace.left_out * (heavy - pace.even)) * size
-    resting = pace.resting * (size if size < pace.rest_power else pace.rest_power)
-    return math.copysign(moving if moving > resting else resting, surplus)
+    resting = pace.resting * (pace.rest_power if pace.rest_power < size else size)
+    return math.copysign(resting if moving < resting else moving, surplus)
 
 
 def _agreed(error_k: float, spread_k: float, bounds: tuple[float, float], pace: Pace) -> float:

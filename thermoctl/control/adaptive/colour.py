@@ -70,7 +70,7 @@ class Colour(NamedTuple):
             limit = _MOST * math.sqrt(max(square, LEAST_K2))
             nu = clamp(nu, -limit, limit)
         kept, most_kept = n + _FIRST, hearing.colour_samples
-        rate = 1.0 / (kept if kept < most_kept else most_kept)
+        rate = 1.0 / (most_kept if most_kept < kept else kept)
         mean_k += (nu - mean_k) * rate
         product += (nu * last_k - product) * rate
         square += (nu * nu - square) * rate

@@ -88,9 +88,9 @@ class Noise(NamedTuple):
         if n >= 2:
             second = y_c - 2.0 * last_c + before_last_c
             square = second * second / _SPREAD
-            most = _MOST * (variance if variance > NOISE_START_K2 else NOISE_START_K2)
+            most = _MOST * (NOISE_START_K2 if variance < NOISE_START_K2 else variance)
             rate = _MEMORY if n >= _SETTLED else 1.0 / (n + 5.0)
-            variance += ((square if square < most else most) - variance) * rate
+            variance += ((most if most < square else square) - variance) * rate
             if y_c < coldest_c:
                 coldest_c = min(coldest_c, max(y_c, last_c, before_last_c))
         moved_k, news = abs(y_c - last_c), False
@@ -126,7 +126,7 @@ class Noise(NamedTuple):
     def believed(self) -> float:
         """The variance that filters are told, R of their equations."""
         variance, least = self.variance, self.least
-        return (variance if variance > least else least) + self.colour.variance
+        return (least if variance < least else variance) + self.colour.variance
 
 
 UNHEARD = Noise()
@@ -256,8 +256,8 @@ class Drifting(NamedTuple):
         if calm < rest and not disturbed:
             return Drifting(calm, silent_until=self.silent_until)
         above, below = self.above + nu - DRIFTS, self.below - nu - DRIFTS
-        above, below = above if above > 0.0 else 0.0, below if below > 0.0 else 0.0
-        most = above if above > below else below
+        above, below = 0.0 if above < 0.0 else above, 0.0 if below < 0.0 else below
+        most = below if above < below else above
         suspected, found = most > hearing.suspected_sds, most > hearing.drifted_sds
         return Drifting(calm, above, below, self.silent_until, disturbed, suspected, found)
 

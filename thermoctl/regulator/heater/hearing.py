@@ -122,9 +122,7 @@ def _still_rises(rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float) -> 
     """Return whether the reading goes on rising, which no cut of a sound heater lets it do."""
     last_s, most = max(row.t_s for row in rows), known.mean
     from_s = max(cut.at_s, last_s - max(OFF_LAGS * known.lag_s, question.BEFORE_S))
-    if (
-        cut.rose is not None
-    ):  # a gain that was overstated; of a weak one a few readings tell nothing
+    if cut.rose is not None:  # the gain may be overstated, and a few readings of a weak one no sign
         from_s, most = min(from_s, 0.5 * (cut.at_s + last_s)), clamp(cut.rose, 0.0, most)
     return question.slope(rows, from_s, less_sd_k=sd_k) > RISES * most
 

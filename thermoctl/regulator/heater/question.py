@@ -50,6 +50,8 @@ CREPT_LAGS = 4.5
 LONGEST_S, LONGEST_LAGS, LONGEST_SDS = 240.0, 12.0, 20.0
 """Longest wait for the answer of a known heater: in s, in lags, and in standard deviations of a
 reading over the gain, the longest of the three."""
+SLOPE_BLOCKS = 3.0
+"""A slope takes so many blocks at least, however long they are."""
 ROUTINE_S = 1200.0
 """The same where nothing is in doubt: what is sound answers sooner."""
 LIKELY = 1.0
@@ -205,7 +207,8 @@ def of_unknown_rows(
             break
         answer, shown = of_unknown(found, weakest, drift)
         if answer is not Answer.OPEN:
-            turns = turned(answer, recent, cut_s, 2.0 * BEFORE_S)
+            recent_s = max(2.0 * BEFORE_S, SLOPE_BLOCKS * (seen[-1].t_s - seen[-2].t_s))
+            turns = turned(answer, recent, cut_s, recent_s)
             return (answer if turns else Answer.OPEN), shown
     return Answer.OPEN, shown
 

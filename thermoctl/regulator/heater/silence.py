@@ -136,11 +136,12 @@ class Silence:
         Sooner `again`, after a bad answer. What has `answered` well may stand under full power for
         the reason it was asked for, unless it has fallen since.
         """
+        stands = None
         if not again:
             stands = self._standing.question(gain, weakest, now, sd_k, answered=answered)
-            stands = stands or self._unbroken.question(gain, now, sd_k)
-            if stands is not None:
-                return stands
+        stands = stands or self._unbroken.question(gain, now, sd_k)
+        if stands is not None:
+            return stands
         if gain.mean < STRONG_K_PER_S:
             return None
         since, falls, moved = self.since, self._falls, not self._rested

@@ -14,9 +14,9 @@ from thermoctl.regulator.heater.cut import Cut
 from thermoctl.regulator.heater.question import LONGEST_S, LONGEST_SDS, ROUTINE_S
 from thermoctl.regulator.heater.response import Gain, Seen
 
-UNBROKEN_S, LONGER, AGAIN_S = 7200.0, 2.0, 900.0
+UNBROKEN_S, LONGER, AGAIN_S = 7200.0, 2.0, 450.0
 """Time in s under nearly full power until it is asked, its factor from then on, and that time after
-a bad answer."""
+a bad answer: the next one comes within the time in which it latches."""
 
 
 class Unbroken:

@@ -1,9 +1,9 @@
 """Whether the reading answers to the power, and what is done when it does not.
 
 A heater that is known is watched by `HeatDoubt`. One that is not yet known has some seconds of full
-power to show a rise (`Trial`). A heater in doubt is asked: the power is cut for some lags, whatever
-the controller wants, and `question` reads the answer. No answer, or the wrong one, is SAFE, and for
-the second time LATCHED; a reading that goes on rising without power is LATCHED at once.
+power to show a rise (`Trial`). A heater in doubt is asked: the power is cut for some lags, and
+`question` reads the answer. No answer, or the wrong one, is SAFE, and for the second time LATCHED;
+a reading that goes on rising without power is LATCHED at once.
 """
 
 from __future__ import annotations
@@ -27,8 +27,7 @@ from thermoctl.regulator.heater.trial import Trial
 from thermoctl.regulator.heater.verdicts import Verdicts
 from thermoctl.regulator.supervisor import Emit
 
-OFF = 0.01
-"""Power below which the output counts as off."""
+OFF = 0.01  # power below which the output counts as off
 ROWS = 450
 """Number of blocks that are remembered: half an hour at a period of 1 s."""
 
@@ -147,7 +146,7 @@ class HeaterWatch:
             self._withdraw()
         self._trial.account.add(block.power, before, now, there=there)
         if self._cut is not None:
-            self._look_for_answer(self._cut, block, now, t_s)
+            self._look_for_answer(self._cut, sd_k, now, t_s)
             return
         if there:
             self._climb.pause()
@@ -273,14 +272,15 @@ class HeaterWatch:
         self._cut = cut._replace(quiet=False)
         self._emit("heater.questioned", text=f"{cut.why}; power is cut to see what it does")
 
-    def _look_for_answer(self, cut: Cut, block: Block, now: Seen, t_s: float) -> None:
+    def _look_for_answer(self, cut: Cut, sd_k: float, now: Seen, t_s: float) -> None:
         """Look for an answer; go on when it is a good one, fail when it is none."""
         known, lag_s, asked_s = self._heater.gain, self._heater.longer_s, now.t_s - cut.at_s
-        if known is not None and self._latch_if_heated(known, now, block.sd_k, t_s):
+        doubted = known if cut.rose is None else None  # walls give off heat beyond any lag
+        if doubted is not None and self._latch_if_heated(doubted, now, sd_k, t_s):
             return
-        answer, shown = self._answer(cut, block.sd_k)
+        answer, shown = self._answer(cut, sd_k)
         if known is None:
-            answer = self._trial.account.audited(answer, shown, self._rows, block.sd_k)
+            answer = self._trial.account.audited(answer, shown, self._rows, sd_k)
         heard_s, bad_s = hearing.believed_s(known, lag_s)
         if cut.quiet and hearing.tells(answer, asked_s, lag_s):
             self._tell(cut)
@@ -298,8 +298,8 @@ class HeaterWatch:
             self._leave_open(asked_s)
         elif answer is not Answer.OPEN:
             self._refuse(answer, cut, shown, asked_s, t_s)
-        elif known is not None and asked_s > hearing.longest_s(cut, known, block.sd_k):
-            answer, shown = self._answer(cut, block.sd_k, question.LIKELY)
+        elif known is not None and asked_s > hearing.longest_s(cut, known, sd_k):
+            answer, shown = self._answer(cut, sd_k, question.LIKELY)
             if answer is Answer.HEATS:
                 self._emit("heater.answered", text=hearing.LIKELY.format(asked_s, shown.mean))
                 self._trust()
@@ -307,12 +307,12 @@ class HeaterWatch:
                 self._leave_open(asked_s)
             else:
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
-        elif known is None and asked_s > self._trial.listens_s(block.sd_k):
-            if self._trial.over(shown, block.sd_k):
+        elif known is None and asked_s > self._trial.listens_s(sd_k):
+            if self._trial.over(shown, sd_k):
                 self._verdicts.note(self._t_s)  # asked often enough: nothing is left to be tried
                 self._refuse(Answer.NOTHING, cut, shown, asked_s, t_s)
                 return
-            self._trial.enlarge(block.sd_k)
+            self._trial.enlarge(sd_k)
             self._resume()
 
     def _leave_open(self, asked_s: float) -> None:
