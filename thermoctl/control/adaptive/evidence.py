@@ -26,7 +26,7 @@ NOISE_MIN_K2 = 1e-5
 """Least variance of the noise in K², 3 mK: the model is no better than that."""
 _SPREAD = 6.0  # variance of y - 2 y1 + y2 in units of the noise's: 1 + 4 + 1
 _MOST = 9.0  # a second difference counts as three standard deviations at most
-_MEMORY, _SETTLED = 0.005, 195  # of 200 samples; from the sample on that has as many before it
+_MEMORY, _SETTLED = 0.005, 195  # of 200 samples; from there on 1 / (n + 5) is less
 NEARER = 0.9
 """Share of the way from the coldest reading that counts. Radiation, vapour and walls that warm let
 a loss grow faster than in proportion, as if the surroundings were nearer."""

@@ -42,7 +42,7 @@ FAILED = "balance.failed"
 
 @dataclass(slots=True)
 class Gathered:
-    """Sums over a stretch; open to be added to, for a new one every sample takes longer."""
+    """Sums over a stretch; open to change, for a new one every sample takes longer."""
 
     span_s: float = 0.0
     heat_s: float = 0.0

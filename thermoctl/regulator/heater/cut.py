@@ -28,7 +28,8 @@ class Cut(NamedTuple):
         Whether the plant may be at what it can reach, where little is left of its gain.
     rose : float or None
         How fast the reading rose in K/s, where hours of full power are all there is to ask about:
-        nothing is in doubt then, and an answer that stays open is left open.
+        nothing is in doubt then, an answer that stays open is left open, and a rise proves nothing:
+        walls give off heat for longer than any lag.
     """
 
     at_s: float

@@ -249,8 +249,7 @@ class HeatDoubt:
         full_k = gain.mean * span_s
         self._cool(gain, span_s, now.reading_c)
         loss_k = (self.loss(gain) + self._unseen(gain, now.reading_c)) * span_s
-        lost_k = loss_k * self._lost_there(now.reading_c)
-        self._silence.add(gain, block, before, now, lost_k, proven=proven)
+        self._silence.add(gain, block, before, now, loss_k * self._lost_at(now), proven=proven)
         self._answered_s -= span_s
         large = proven and self._answered_s <= 0.0 and loss_k > MUCH_SHARE * full_k
         missing_k = self._missing_k - FULL_SHARE * full_k
@@ -288,10 +287,10 @@ class HeatDoubt:
             return above_k * max(gain.cools_per_s, 1.0 / COOLS_WITHIN_S)
         return above_k * SURE_SHARE * gain.cools_per_s
 
-    def _lost_there(self, reading_c: float) -> float:
+    def _lost_at(self, now: Seen) -> float:
         """Return the share of the loss that there is at a reading: none where it was coldest."""
-        above_k = self._level_c - self._coldest_c
-        return clamp((reading_c - self._coldest_c) / above_k, 0.0, 1.0) if above_k > 0.0 else 1.0
+        above_k, here_k = self._level_c - self._coldest_c, now.reading_c - self._coldest_c
+        return clamp(here_k / above_k, 0.0, 1.0) if above_k > 0.0 else 1.0
 
     def _cool(self, gain: Gain, span_s: float, reading_c: float) -> None:
         """Remember how fast the plant surely cooled a while ago."""

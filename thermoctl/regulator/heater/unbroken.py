@@ -1,4 +1,4 @@
-"""Full power for hours, of a heater that was never seen to obey less: is it the heater that warms?
+"""Hours of full power, of a heater that this run has never seen obey less.
 
 A gain is told by powers that move. Where one has been at full power since it was first seen to
 heat, what rises with it may be the air around a sensor that lies beside its vessel. The gain was an

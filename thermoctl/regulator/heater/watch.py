@@ -275,8 +275,7 @@ class HeaterWatch:
     def _look_for_answer(self, cut: Cut, sd_k: float, now: Seen, t_s: float) -> None:
         """Look for an answer; go on when it is a good one, fail when it is none."""
         known, lag_s, asked_s = self._heater.gain, self._heater.longer_s, now.t_s - cut.at_s
-        doubted = known if cut.rose is None else None  # walls give off heat beyond any lag
-        if doubted is not None and self._latch_if_heated(doubted, now, sd_k, t_s):
+        if cut.rose is None and known is not None and self._latch_if_heated(known, now, sd_k, t_s):
             return
         answer, shown = self._answer(cut, sd_k)
         if known is None:
