@@ -28,6 +28,9 @@ LEFT, LEFT_SURE = 0.15, 2.0
 """Share of its gain that is left to a heater at what its plant can reach: a jacket, a PTC element
 or a compressor gives less the nearer it comes, and without it a plant that is well insulated cools
 by as little. And the least number of standard deviations by which so little is an answer."""
+GOES_ON = 0.5
+"""Share of the rate at full power by which a reading that rises after a long cut goes on as before:
+a wall has given off most of its heat by then."""
 RECENT_S = 60.0
 """Time before a cut that nothing gave rise to, in s, in which there is seldom a load."""
 RISES_SDS = 5.0
@@ -118,13 +121,15 @@ def unasked(rows: Collection[Seen], since_s: float, known: Gain, sd_k: float) ->
     return back and evidence.odds(rows, from_s, known, sd_k) > evidence.SOUND
 
 
-def _still_rises(rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float) -> bool:
+def _still_rises(
+    rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float, share: float = RISES
+) -> bool:
     """Return whether the reading goes on rising, which no cut of a sound heater lets it do."""
     last_s, most = max(row.t_s for row in rows), known.mean
     from_s = max(cut.at_s, last_s - max(OFF_LAGS * known.lag_s, question.BEFORE_S))
     if cut.rose is not None:  # the gain may be overstated, and a few readings of a weak one no sign
         from_s, most = min(from_s, 0.5 * (cut.at_s + last_s)), clamp(cut.rose, 0.0, most)
-    return question.slope(rows, from_s, less_sd_k=sd_k) > RISES * most
+    return question.slope(rows, from_s, less_sd_k=sd_k) > share * most
 
 
 def _of_routine(
@@ -146,7 +151,8 @@ def _of_routine(
         return Answer.OPEN, shown
     weakest = question.ANSWERS * known.mean
     found, shown = question.of_unknown_rows(rows, (cut.from_s,), cut.at_s, weakest, sd_k)
-    return Answer.NOTHING if found is Answer.NOTHING else Answer.HIDDEN, shown
+    goes_on = shown.mean < weakest and _still_rises(rows, cut, known, sd_k, GOES_ON)
+    return Answer.NOTHING if found is Answer.NOTHING or goes_on else Answer.HIDDEN, shown
 
 
 def _nothing_came(rows: Collection[Seen], cut: Cut, known: Gain, sd_k: float) -> bool:
