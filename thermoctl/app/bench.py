@@ -17,15 +17,14 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from thermoctl import __version__
 from thermoctl.app.compose import loop_for
 from thermoctl.app.cycle_record import as_line
-from thermoctl.app.daemon.beside import order_service
 from thermoctl.app.daemon.insight_watch import InsightService, insights_for
+from thermoctl.app.daemon.order_service import OrderService, order_service
 from thermoctl.app.doubts import doubts
 from thermoctl.app.live import Action, Desk, Facts, Keys, LiveModel, LiveScreen, look_for
 from thermoctl.app.live.desk import DISTURBANCES
@@ -40,9 +39,6 @@ from thermoctl.services.history.schema import RunInfo
 from thermoctl.services.history.writer import HistoryWriter
 from thermoctl.services.places import make_private, state_dir
 from thermoctl.signals import Cycle, Event
-
-if TYPE_CHECKING:
-    from thermoctl.app.daemon.order_watch import OrderService
 
 HISTORY = "sim.sqlite"
 _DRAW_S = 0.05

@@ -9,14 +9,10 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import Generic, TypeVar
 
-from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.services.feed import Feed
 from thermoctl.signals import Cycle
-
-if TYPE_CHECKING:
-    from thermoctl.app.daemon.order_watch import OrderService
 
 W = TypeVar("W")
 
@@ -90,12 +86,3 @@ class Beside(ABC, Generic[W]):
     def _run(self) -> None:
         while not self._closing.wait(_TURN_S):
             self.turn()
-
-
-def order_service(loops: Mapping[str, LoopTable], report: Report) -> OrderService | None:
-    """Return what weighs orders beside `loops`; nothing is loaded where none asks."""
-    if not any(table.weighs_orders for table in loops.values()):
-        return None
-    from thermoctl.app.daemon.order_watch import OrderService, watches_for
-
-    return OrderService(watches_for(loops), report)

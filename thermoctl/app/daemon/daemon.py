@@ -18,9 +18,9 @@ from pathlib import Path
 
 from thermoctl import __version__
 from thermoctl.app.compose import loop_for
-from thermoctl.app.daemon.beside import order_service
 from thermoctl.app.daemon.clerk import Clerk
 from thermoctl.app.daemon.insight_watch import InsightService, insights_for
+from thermoctl.app.daemon.order_service import order_service
 from thermoctl.app.daemon.resuming import Resumption, kept_latches
 from thermoctl.app.doubts import doubts
 from thermoctl.app.parts import law_of_kind

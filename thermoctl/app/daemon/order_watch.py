@@ -1,8 +1,7 @@
 """Orders weighed beside the loop by a consumer of cycles that never steers.
 
-`OrderWatch` is the weighing, one cycle after the other; `OrderService` runs it in a thread of its
-own, behind a bounded feed. Why it lives here and not in the regulator is the decision of
-``docs/decisions/0014-orders-are-weighed-beside-the-loop.md``.
+`thermoctl.app.daemon.order_service` shows the cycles to it. Why it lives here and not in the
+regulator is the decision of ``docs/decisions/0014-orders-are-weighed-beside-the-loop.md``.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 
 from thermoctl.app.configuration.tables import LoopTable
-from thermoctl.app.daemon.beside import Beside, Report
 from thermoctl.estimation import LainiotisBank, Order
 from thermoctl.signals import Cycle, Mode, Quality
 from thermoctl.studies.orders import EVIDENCE, SETTLED, USUAL
@@ -184,43 +182,3 @@ def watches_for(loops: Mapping[str, LoopTable]) -> dict[str, OrderWatch]:
             orders = [Order(*each) for each in table.orders.candidates or ()]
             watches[name] = OrderWatch(orders or USUAL, table.period_s, table.power_max)
     return watches
-
-
-class OrderService(Beside[OrderWatch]):
-    """Runs watches in a thread; one that fails is dropped and told of.
-
-    Parameters
-    ----------
-    watches : mapping
-        A watch by the name of its loop.
-    report : callable
-        Called as ``report(name, loop, **fields)`` in the thread.
-    """
-
-    def __init__(self, watches: Mapping[str, OrderWatch], report: Report) -> None:
-        super().__init__("orders", "orders.failed", watches, report)
-        self._named: dict[str, Order] = {}
-
-    def keys(self, loop: str) -> dict[str, Any]:
-        """Return the keys a line of JSON on `loop` gets, none while nothing is known."""
-        watch = self._watches.get(loop)
-        return {} if watch is None or watch.finding is None else watch.finding.as_json()
-
-    def look(self, watch: OrderWatch, cycle: Cycle) -> None:
-        """Show `cycle` to its watch, and tell of an order that is newly found."""
-        found = watch.take(cycle)
-        if found is not None:
-            self._tell(cycle.loop, found)
-
-    def _tell(self, loop: str, found: Finding) -> None:
-        before, self._named[loop] = self._named.get(loop), found.order
-        order = found.order
-        self._report(
-            "orders.changed",
-            loop,
-            n=order.n,
-            m=order.m,
-            delay=order.delay,
-            probability=round(found.probability, 4),
-            before=None if before is None else [before.n, before.m, before.delay],
-        )

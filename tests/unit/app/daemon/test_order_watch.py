@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from thermoctl.app.cycle_record import as_line
-from thermoctl.app.daemon.beside import order_service
-from thermoctl.app.daemon.order_watch import Finding, OrderService, OrderWatch, watches_for
+from thermoctl.app.daemon.order_service import OrderService, order_service
+from thermoctl.app.daemon.order_watch import Finding, OrderWatch, watches_for
 from thermoctl.app.settings import load
 from thermoctl.app.sim import bench_settings, simulate
 from thermoctl.errors import ConfigError
