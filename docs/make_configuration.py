@@ -12,8 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from thermoctl.app import plugins
+from thermoctl.app.catalogue import Row, rows_of_law, rows_of_model
 from thermoctl.app.configuration import tables
-from thermoctl.app.configuration.catalogue import Row, rows_of_law, rows_of_model
 
 PAGE = Path(__file__).parent / "configuration.md"
 MARKED = re.compile(

@@ -21,12 +21,12 @@ from typing import Final
 from pydantic import BaseModel
 
 from thermoctl.app import serial_ports
-from thermoctl.app.commands.config import runnable
 from thermoctl.app.compose import board_builder, driver_of
 from thermoctl.app.configuration.document import exposures
 from thermoctl.app.daemon.daemon import state_for
 from thermoctl.app.doubts import doubts
 from thermoctl.app.parts import sensor_for
+from thermoctl.app.runnable import runnable
 from thermoctl.app.settings import ETC, Settings
 from thermoctl.errors import ConfigError, DriverError, NotPermitted
 from thermoctl.ports import Board, Clock

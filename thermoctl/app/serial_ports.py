@@ -11,11 +11,9 @@ from typing import Final
 
 from serial.tools import list_ports
 
-from thermoctl.app.commands.service import SERVICE_STATE
 from thermoctl.services.lock import LONGEST, device_lock_path
-from thermoctl.services.places import runtime_dir
+from thermoctl.services.places import SERVICE_RUN, SERVICE_STATE, runtime_dir
 
-SERVICE_RUN: Final = Path("/run/thermoctl")
 TERMINAL_DRIVERS: Final = Path("/proc/tty/drivers")
 SERIAL_GROUPS: Final = ("dialout", "uucp", "plugdev")
 """Groups that exist to give the right to ports; any other may give much more, root above all."""

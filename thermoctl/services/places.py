@@ -13,6 +13,9 @@ from thermoctl.errors import NotPermitted, Unavailable
 
 PRIVATE: Final = 0o700
 NAME: Final = "thermoctl"
+SERVICE_STATE: Final = Path("/var/lib/thermoctl")
+SERVICE_RUN: Final = Path("/run/thermoctl")
+"""Where the service that systemd runs keeps its state, its sockets and its locks."""
 
 
 def state_dir(environ: Mapping[str, str] = os.environ) -> Path:

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from thermoctl.app.compose import regulator_for, wiring_errors
 from thermoctl.app.configuration.device_tables import ActuatorTable, SensorTable
 from thermoctl.app.configuration.document import BadConfiguration, exposures
-from thermoctl.app.configuration.in_force import in_force
 from thermoctl.app.configuration.tables import (
     GuardsTable,
     HistoryTable,
@@ -25,6 +24,7 @@ from thermoctl.app.configuration.tables import (
     ServiceTable,
 )
 from thermoctl.app.doubts import doubts
+from thermoctl.app.in_force import in_force
 from thermoctl.app.settings import load, load_all
 from thermoctl.errors import ConfigError
 from thermoctl_drivers.simulated import SimulatedSettings

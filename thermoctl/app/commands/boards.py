@@ -49,7 +49,7 @@ def drivers(ctx: click.Context, as_json: bool) -> None:
 
 def _driver(kind: str, entry: EntryPoint) -> dict[str, Any]:
     """Return what is said of a kind; one that cannot be loaded says why."""
-    from thermoctl.app.configuration.catalogue import first_line
+    from thermoctl.app.catalogue import first_line
 
     origin = f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else entry.value
     try:
@@ -65,7 +65,7 @@ def _driver(kind: str, entry: EntryPoint) -> dict[str, Any]:
 @json_option
 def show(kind: str, as_json: bool) -> None:
     """List the settings of a KIND: type, unit, bounds, default and what it is for."""
-    from thermoctl.app.configuration.catalogue import first_line, rows_of_model
+    from thermoctl.app.catalogue import first_line, rows_of_model
 
     try:
         driver = plugins.find(plugins.DRIVERS, kind)

@@ -16,7 +16,11 @@ import click
 from thermoctl.app import plugins
 from thermoctl.app.commands.endings import EXIT_FAILED
 from thermoctl.app.commands.options import FILE, Parsed, examples, json_option
-from thermoctl.app.commands.results import (
+from thermoctl.app.configuration.bases import Options
+from thermoctl.app.configuration.tables import LoopTable
+from thermoctl.app.parts import plan_for
+from thermoctl.app.plugins import BadOption
+from thermoctl.app.results import (
     console,
     make_folder,
     print_json,
@@ -24,10 +28,6 @@ from thermoctl.app.commands.results import (
     watched,
     write_figures,
 )
-from thermoctl.app.configuration.bases import Options
-from thermoctl.app.configuration.tables import LoopTable
-from thermoctl.app.parts import plan_for
-from thermoctl.app.plugins import BadOption
 from thermoctl.app.settings import load
 from thermoctl.app.sim import profile
 from thermoctl.errors import ConfigError, Refused, Unavailable

@@ -7,23 +7,16 @@ from pathlib import Path
 
 import click
 
+from thermoctl.app.commands.config_new import new
 from thermoctl.app.commands.options import Commands, config_option, json_option
 from thermoctl.app.commands.service import settings_of
-from thermoctl.app.compose import wiring_errors
-from thermoctl.app.configuration.document import (
-    BadConfiguration,
-    Problem,
-    exposures,
-    read_document,
-)
-from thermoctl.app.configuration.in_force import in_force
-from thermoctl.app.configuration.new import new
+from thermoctl.app.configuration.document import exposures
 from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.configuration.toml_text import toml_text
 from thermoctl.app.doubts import doubts
-from thermoctl.app.settings import Settings, default_files, settings_in
-
-_REST = "how loops and boards go together is checked once this is mended"
+from thermoctl.app.in_force import in_force
+from thermoctl.app.runnable import runnable
+from thermoctl.app.settings import default_files
 
 
 @click.group(cls=Commands)
@@ -54,30 +47,6 @@ def check(configs: tuple[Path, ...], as_json: bool) -> None:
     click.echo(f"{', '.join(map(str, files))}: ok; loops: {loops}; boards: {hardware}")
 
 
-def runnable(files: list[Path]) -> Settings:
-    """Return the settings in `files`, tried out as far as that needs no hardware.
-
-    Raises
-    ------
-    ConfigError
-        `BadConfiguration`, with everything that is wrong, the wiring included.
-    """
-    document = read_document(files)
-    wrong: list[Problem] = []
-    settings: Settings | None
-    try:
-        settings = settings_in(document)
-    except BadConfiguration as error:
-        wrong += error.problems
-        settings = error.read
-    note = _REST if settings is None else ""
-    if settings is not None:
-        wrong += [document.problem(key, text) for key, text in wiring_errors(settings)]
-    if wrong or settings is None:
-        raise BadConfiguration(wrong, note=note)
-    return settings
-
-
 @config.command()
 @config_option
 @json_option
@@ -91,7 +60,7 @@ def show(configs: tuple[Path, ...], as_json: bool) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Accepted for symmetry; it is JSON anyway.")
 def schema(as_json: bool) -> None:
     """Print the JSON schema of a configuration, for editors and other programs."""
-    from thermoctl.app.configuration.catalogue import schema as json_schema
+    from thermoctl.app.catalogue import schema as json_schema
 
     click.echo(json.dumps(json_schema(), indent=None if as_json else 2, ensure_ascii=False))
 

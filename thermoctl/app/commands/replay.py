@@ -9,7 +9,7 @@ import click
 
 from thermoctl.app.commands.options import FILE, Parsed, examples, positive_number
 from thermoctl.app.commands.order_options import candidates_option, require_auto
-from thermoctl.app.commands.results import console, print_json, say, write_figures
+from thermoctl.app.results import console, print_json, say, write_figures
 from thermoctl.estimation import Order
 from thermoctl.model.arx import Arx
 from thermoctl.studies.csv_record import read_csv

@@ -18,7 +18,7 @@ import click
 
 from thermoctl.app.commands.endings import EXIT_INTERRUPTED
 from thermoctl.app.commands.options import DURATION, FILE, Commands, Parsed, positive_number
-from thermoctl.app.commands.results import (
+from thermoctl.app.results import (
     console,
     make_folder,
     print_json,

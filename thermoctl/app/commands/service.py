@@ -19,9 +19,7 @@ from thermoctl.app.commands.options import (
     state_option,
 )
 from thermoctl.app.settings import Settings, default_files, load_all
-from thermoctl.services.places import state_dir
-
-SERVICE_STATE = Path("/var/lib/thermoctl")
+from thermoctl.services.places import SERVICE_STATE, state_dir
 
 
 @click.command(

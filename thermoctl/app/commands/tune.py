@@ -25,10 +25,10 @@ from thermoctl.app.commands.options import (
     state_option,
 )
 from thermoctl.app.commands.order_options import candidates_option, require_auto
-from thermoctl.app.commands.results import console, make_folder, print_json, say
 from thermoctl.app.commands.service import settings_of
 from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.parts import plan_for
+from thermoctl.app.results import console, make_folder, print_json, say
 from thermoctl.app.settings import Settings, load_all
 from thermoctl.app.sim import bench_settings, default_profile, stand_ins
 from thermoctl.app.tuning.report import Report

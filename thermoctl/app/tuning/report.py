@@ -11,9 +11,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from thermoctl.app.commands.results import say
-from thermoctl.app.configuration.suggestion import in_force, suggested, suggestion_text
 from thermoctl.app.configuration.tables import LoopTable
+from thermoctl.app.results import say
+from thermoctl.app.tuning.suggestion import in_force, suggested, suggestion_text
 from thermoctl.app.tuning.trial import NAMES, Ending, Outcome
 from thermoctl.errors import Unavailable
 from thermoctl.studies.excitation import Excitation

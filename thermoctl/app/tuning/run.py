@@ -16,9 +16,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from thermoctl.app.commands.results import say
 from thermoctl.app.compose import loop_for
 from thermoctl.app.daemon.daemon import SIGNALS, locks_of, state_for
+from thermoctl.app.results import say
 from thermoctl.app.settings import Settings
 from thermoctl.app.tuning.trial import Outcome, Trial, alone
 from thermoctl.errors import Refused

@@ -13,11 +13,11 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thermoctl.app.catalogue import INJECTED
 from thermoctl.app.cli import cli, main
 from thermoctl.app.compose import wiring_errors
-from thermoctl.app.configuration.catalogue import INJECTED
-from thermoctl.app.configuration.in_force import in_force
 from thermoctl.app.configuration.toml_text import toml_text
+from thermoctl.app.in_force import in_force
 from thermoctl.app.parts import plan_for
 from thermoctl.app.plugins import CONTROLLERS, ESTIMATORS, find, option_names
 from thermoctl.app.settings import load

@@ -16,8 +16,8 @@ from thermoctl.app.cli import cli
 from thermoctl.app.commands import tune as tune_module
 from thermoctl.app.commands.endings import exit_code_of, words_of
 from thermoctl.app.commands.tune import tune_command
-from thermoctl.app.configuration.suggestion import limit_keys
 from thermoctl.app.settings import load
+from thermoctl.app.tuning.suggestion import limit_keys
 from thermoctl.app.tuning.trial import plan
 from thermoctl.services.lock import DaemonLock
 from thermoctl.services.store import Latch, LatchStore

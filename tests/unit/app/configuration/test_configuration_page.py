@@ -10,15 +10,15 @@ from pathlib import Path
 import pytest
 
 from thermoctl.app import plugins
-from thermoctl.app.compose import wiring_errors
-from thermoctl.app.configuration import tables
-from thermoctl.app.configuration.bases import Table
-from thermoctl.app.configuration.catalogue import (
+from thermoctl.app.catalogue import (
     first_line,
     option_schemas,
     parameter_texts,
     rows_of_law,
 )
+from thermoctl.app.compose import wiring_errors
+from thermoctl.app.configuration import tables
+from thermoctl.app.configuration.bases import Table
 from thermoctl.app.configuration.units import unit_of
 from thermoctl.app.settings import load
 from thermoctl_drivers.simulated import SimulatedSettings

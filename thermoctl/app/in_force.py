@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from thermoctl.app import plugins
-from thermoctl.app.configuration.catalogue import INJECTED
+from thermoctl.app.catalogue import INJECTED
 from thermoctl.app.configuration.tables import LoopTable
 from thermoctl.app.parts import plan_for
 from thermoctl.app.settings import Settings
