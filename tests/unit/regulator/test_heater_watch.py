@@ -441,6 +441,14 @@ def test_equal_readings_are_a_fault_only_where_noise_is_larger_than_a_step():
     assert not any(coarse.observe(37.088) for _ in range(600))
 
 
+@pytest.mark.parametrize("noise", [0.05, 0.16, 0.3])
+def test_a_quiet_converter_between_two_steps_flickers_and_proves_nothing(noise):
+    rng, sensor = np.random.default_rng(7), StuckSensor()
+    for n in range(6000):
+        steps = min(n, 200) + 0.5 - (0.5 * (n > 4000))  # on its way, between two, on one of them
+        assert not sensor.observe(0.0625 * round(steps + noise * rng.standard_normal()))
+
+
 # -- configuration -------------------------------------------------------------------------------
 
 LOOP = {"setpoint_c": 37.5, "trip_above_c": 60.0}
