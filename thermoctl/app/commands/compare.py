@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from thermoctl.app import plugins
-from thermoctl.app.commands.endings import EXIT_FAILED
+from thermoctl.app.commands.endings import EXIT_FAILED, terminable
 from thermoctl.app.commands.options import FILE, Parsed, examples, json_option
 from thermoctl.app.configuration.bases import Options
 from thermoctl.app.configuration.tables import LoopTable
@@ -253,7 +253,7 @@ def compare(
     """Compare controllers on the same simulated plants, as ratios to bounds.
 
     Every controller meets the same plants, mishaps and noise, and is judged on the true temperature
-    of the water. Ctrl-C keeps what is finished.
+    of the water. Ctrl-C and SIGTERM keep what is finished.
     """
     if quick and seeds is not None:
         raise click.UsageError("expected --quick or --seeds, got both")
@@ -266,7 +266,8 @@ def compare(
         raise click.UsageError(f"expected a scenario of {', '.join(fleets)}, got none of them")
     make_folder(out)
     store = Store(out / RESULTS)
-    results = _played(planned, store, jobs or os.cpu_count() or 1)
+    with terminable():
+        results = _played(planned, store, jobs or os.cpu_count() or 1)
     lines = summarise(results, names)
     _draw(lines, names, out)
     if as_json:

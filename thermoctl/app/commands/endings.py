@@ -1,7 +1,7 @@
 """How a command ends: streams closed, full or narrow; errors in one line each.
 
 Exit codes: 1 failed, 2 wrong usage, 3 no daemon runs, 4 an alarm is active, 69 something is
-missing or held, 77 not permitted, 78 bad configuration, 130 interrupted.
+missing or held, 77 not permitted, 78 bad configuration, 130 interrupted, 143 terminated.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ import io
 import json
 import os
 import re
+import signal
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any, Final, TextIO
 
 import click
@@ -21,7 +22,7 @@ import click
 from thermoctl.errors import ConfigError, NotPermitted, NotRunning, ThermoctlError, Unavailable
 
 EXIT_FAILED, EXIT_USAGE, EXIT_UNAVAILABLE, EXIT_PERMISSION, EXIT_CONFIG = 1, 2, 69, 77, 78
-EXIT_NOT_RUNNING, EXIT_ALARM, EXIT_INTERRUPTED = 3, 4, 130
+EXIT_NOT_RUNNING, EXIT_ALARM, EXIT_INTERRUPTED, EXIT_TERMINATED = 3, 4, 130, 143
 
 EXPECTED: Final = (click.ClickException, click.Abort, ThermoctlError, OSError)
 """What a command may end with; anything else is a bug and keeps its traceback."""
@@ -74,6 +75,34 @@ def _abandon(stream: TextIO) -> None:
         os.close(nowhere)
 
 
+# -- signals ---------------------------------------------------------------------------------------
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM came: to be met as Ctrl-C is, and told apart by the exit code."""
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Let SIGTERM end what runs inside as Ctrl-C does; from the main thread only.
+
+    Raises
+    ------
+    Terminated
+        SIGTERM came. Another one changes nothing until the end: `timeout` sends it twice.
+    """
+
+    def end(number: int, frame: object) -> None:
+        signal.signal(number, signal.SIG_IGN)
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 # -- errors ----------------------------------------------------------------------------------------
 
 
@@ -81,7 +110,7 @@ def exit_code_of(error: BaseException) -> int:
     """Return the exit code that goes with an error."""
     match error:
         case click.Abort():
-            return EXIT_INTERRUPTED
+            return EXIT_TERMINATED if _is_terminated(error) else EXIT_INTERRUPTED
         case click.ClickException():
             return error.exit_code
         case ConfigError():
@@ -100,8 +129,9 @@ def words_of(error: BaseException) -> str:
     """Return what an error says: no number of the system, and usage in one line."""
     match error:
         case click.Abort():
-            ended = isinstance(error.__context__, EOFError)
-            return "expected an answer, got the end of input" if ended else "interrupted"
+            if isinstance(error.__context__, EOFError):
+                return "expected an answer, got the end of input"
+            return "terminated" if _is_terminated(error) else "interrupted"
         case click.ClickException():
             return _usage(error)
         case OSError() if error.strerror:
@@ -109,6 +139,10 @@ def words_of(error: BaseException) -> str:
             return f"{where}{error.strerror}"
         case _:
             return str(error) or type(error).__name__
+
+
+def _is_terminated(error: click.Abort) -> bool:
+    return isinstance(error.__cause__, Terminated)
 
 
 def _usage(error: click.ClickException) -> str:

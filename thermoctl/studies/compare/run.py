@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import cache
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
 
 from thermoctl.regulator import Plan
@@ -202,7 +204,7 @@ def finished(jobs: Sequence[Job], store: Store, processes: int) -> Iterator[tupl
 def _in_processes(jobs: list[Job], store: Store, processes: int) -> Iterator[tuple[Job, Result]]:
     """Yield the results of `jobs` in the order in which they come."""
     # Started anew instead of forked: a fork would copy the threads' locks of whoever draws a bar.
-    pool = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_leave_interrupts)
+    pool = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_belong_to_parent)
     futures: dict[Future[Result], Job] = {}
     try:
         futures.update({pool.submit(work, job): job for job in jobs})
@@ -217,6 +219,15 @@ def _in_processes(jobs: list[Job], store: Store, processes: int) -> Iterator[tup
                 store.add(future.result())
 
 
-def _leave_interrupts() -> None:
-    """Let an interrupt from the keyboard end the process that gives out the work, not this one."""
+def _belong_to_parent() -> None:
+    """Leave interrupts from the keyboard to the process that gives out the work; end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, name="end-with-parent", daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process as soon as its parent is gone, however that was killed."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()  # the system closes the parent's end of a pipe, after SIGKILL too
+        os._exit(1)  # SystemExit would end this thread alone; the main one waits for work for good

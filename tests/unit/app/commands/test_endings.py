@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -13,7 +14,13 @@ import pytest
 from click.testing import CliRunner
 
 from thermoctl.app.cli import cli, main
-from thermoctl.app.commands.endings import exit_code_of, prepare_streams, words_of
+from thermoctl.app.commands.endings import (
+    Terminated,
+    exit_code_of,
+    prepare_streams,
+    terminable,
+    words_of,
+)
 from thermoctl.errors import BoardConfigError, LinkError, NotPermitted, Unavailable
 from thermoctl.services.store import LatchStore
 
@@ -59,6 +66,25 @@ def test_input_that_ends_before_an_answer_is_no_interruption():
     result = CliRunner().invoke(asking, input="", standalone_mode=False)
     assert words_of(result.exception) == "expected an answer, got the end of input"
     assert words_of(click.Abort()) == "interrupted"
+
+
+def test_a_termination_is_an_interruption_with_a_code_of_its_own():
+    @click.command()
+    def terminated():
+        raise Terminated
+
+    came = CliRunner().invoke(terminated, standalone_mode=False).exception
+    assert isinstance(came, click.Abort)
+    assert (exit_code_of(came), words_of(came)) == (143, "terminated")
+
+
+def test_sigterm_ends_what_is_terminable_once_and_is_given_back():
+    before = signal.getsignal(signal.SIGTERM)
+    with terminable():
+        with pytest.raises(Terminated):
+            signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGTERM)  # nothing comes of it
+    assert signal.getsignal(signal.SIGTERM) == before
 
 
 def test_alarms_without_a_daemon_and_a_configuration_say_that_both_are_missing(
