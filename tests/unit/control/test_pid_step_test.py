@@ -8,7 +8,7 @@ import pytest
 
 from thermoctl.control.pid import Pid
 from thermoctl.control.pid.simc import Gains, Process, simc
-from thermoctl.control.pid.step_fit import step_fit
+from thermoctl.control.pid.step_fit import ANY, step_fit
 from thermoctl.control.pid.stretch import PIECES_MAX, Piece, Stretch
 from thermoctl.estimation import start
 from thermoctl.ports import Situation
@@ -55,13 +55,14 @@ class Loop:
         return Situation(float(self.t_s), float(seconds), self.reading_c, self.setpoint_c,
                          self.power, start(1), NO_PAST, NO_PAST, self.reading_c)  # fmt: skip
 
-    def sample(self, seconds=1, given=None):
-        """Let a sample pass; whoever gives `given` is in charge instead of the law."""
+    def sample(self, seconds=1, given=None, *, asks=False):
+        """Let a sample pass; who gives `given` is in charge, the law in shadow if it `asks`."""
         situation = self.situation(seconds)
         self.belief = self.law.observe(self.belief, situation)
         asked = given
-        if given is None:
-            self.belief, asked = self.law.decide(self.belief, situation)
+        if given is None or asks:
+            self.belief, wanted = self.law.decide(self.belief, situation)
+            asked = wanted if given is None else given
         for name, text in self.law.remarks(self.belief).items():
             self.said.setdefault(name, (self.t_s, text))
         self.power = min(max(asked, 0.0), 1.0)
@@ -121,6 +122,29 @@ def test_a_plant_that_power_does_not_warm_has_no_fit(vessel):
 
 def test_a_few_readings_are_not_enough():
     assert step_fit(warmed(Vessel(), [1.0] * 7)) is None
+
+
+@pytest.mark.parametrize("power", [0.0, 0.25, 0.5, 1.0])
+def test_the_end_of_power_tells_the_lag_whatever_was_before_the_first_reading(power):
+    vessel = Vessel()
+    vessel.advance(power, 60)
+    stretch = warmed(vessel, [1.0] * 60 + [0.0] * 70)
+    assert step_fit(stretch, ANY).total_s == pytest.approx(17.0, rel=0.15)
+
+
+def test_of_full_power_that_goes_on_every_lag_is_as_true_as_another():
+    vessel = Vessel()
+    vessel.advance(1.0, 60)
+    stretch = warmed(vessel, [1.0] * 100)
+    assert step_fit(stretch).total_s < 2.0
+    assert step_fit(stretch, ANY).total_s > 10.0
+
+
+def test_a_stretch_tells_for_how_long_there_has_been_less_power():
+    powers = [0.0, 0.3, 1.0, 0.2, 0.4, 0.1]
+    assert warmed(Vessel(), powers).since_s(0.5) == 3.0
+    assert warmed(Vessel(), [*powers, 0.5]).since_s(0.5) == 0.0
+    assert Stretch().since_s(0.5) == 0.0
 
 
 def test_a_stretch_is_bounded_and_forgets_neither_time_nor_energy():
@@ -238,3 +262,59 @@ def test_a_lag_that_does_not_show_is_given_up_without_power():
     loop = Loop(Pid(), Vessel(slope=20.0, loss=0.0, dead_s=0, lag_s=600.0))
     assert loop.until("controller.tuned", "controller.tuning_failed") == GIVEN
     assert "lag did not show" in loop.said["controller.tuning_failed"][1]
+
+
+# -- a test that begins in the middle of a warm-up -------------------------------------------------
+
+
+def warming(before_s, setpoint_c=40.0):
+    """Return a loop that begins after full power for `before_s`, of which nobody told it."""
+    vessel = Vessel(water_c=24.0)
+    vessel.advance(1.0, before_s)
+    return Loop(Pid(), vessel, setpoint_c)
+
+
+def losing(loop):
+    """Let the loss grow with the temperature, as that of water does."""
+    loop.vessel.loss = 0.006 + 0.0005 * (loop.vessel.water_c - 24.0)
+
+
+@pytest.mark.parametrize("before_s", [8, 12, 20, 30, 45, 60, 150, 250])
+def test_begun_in_the_middle_of_a_warm_up_it_waits_for_the_end_of_power_to_tell_the_lag(before_s):
+    loop = warming(before_s)
+    while "controller.tuned" not in loop.said:
+        losing(loop)
+        loop.sample()
+        assert loop.t_s < 600
+    gains = loop.law.gains(loop.belief)
+    true = simc(Process(0.04, 5.5, (math.inf, 12.0)))
+    assert true.gain_per_k / 1.5 < gains.gain_per_k < 2.0 * true.gain_per_k
+    for _ in range(2000):
+        losing(loop)
+        loop.sample()
+        assert loop.vessel.water_c < 40.5
+    assert loop.vessel.water_c == pytest.approx(40.0, abs=0.05)
+
+
+def test_begun_in_the_middle_of_a_warm_up_its_power_is_full_at_most_half_the_way_that_is_left():
+    loop = warming(150)
+    begun_c = loop.reading_c
+    while loop.reading_c - begun_c < 0.5 * (40.0 - begun_c):
+        loop.sample()
+        assert loop.power == 1.0
+        assert "controller.tuned" not in loop.said
+    loop.sample()
+    assert loop.power == 0.0
+    loop.until("controller.tuned", most_s=loop.t_s + 120)
+
+
+def test_in_the_shadow_of_a_warm_up_it_learns_when_the_other_takes_the_power_away():
+    loop = warming(60)
+    while loop.vessel.water_c < 38.5:
+        loop.sample(given=1.0, asks=True)
+        assert "controller.tuned" not in loop.said
+    while "controller.tuned" not in loop.said:
+        loop.sample(given=0.15, asks=True)
+        assert loop.t_s < 600
+    true = simc(Process(0.04, 5.5, (math.inf, 12.0)))
+    assert loop.law.gains(loop.belief).gain_per_k == pytest.approx(true.gain_per_k, rel=0.4)

@@ -6,7 +6,9 @@ Over a time that is short against the plant's slowest one, its temperature follo
 
 for whatever power u was applied: linear in start, loss and slope once dead time and lag are chosen.
 They are chosen from a grid, weighted by the likelihood of what the best start, loss and slope
-leave. Implements section 6 of ``docs/theory.md``.
+leave. Where nobody knows what was applied before the first reading, each of the grid is there once
+for every power that it may have been, and its heat still comes. Implements section 6 of
+``docs/theory.md``.
 """
 
 from __future__ import annotations
@@ -27,6 +29,13 @@ _SHORTEST_S = 1.0
 _READINGS_MIN = 8
 LOSS_MAX = 0.5
 """Largest loss of a plant, as a share of full power."""
+REST = ((0.0, 0.0),)
+"""No power before the first reading: none in the dead time, and none in the lag."""
+ANY = ((0.0, 0.0), (0.25, 0.25), (0.5, 0.5), (1.0, 0.25), (1.0, 0.5), (1.0, 1.0))
+"""None, a power given for long, or full power for a while: what dead time and lag then hold."""
+COUNTED = 30
+"""Most readings that count where the past is open: no plant is exactly like this, and a loss that
+grows would in time rule out the true one, `test_begun_in_the_middle_of_a_warm_up_it_waits_...`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +57,17 @@ class StepFit:
     longest: bool
 
 
-def step_fit(stretch: Stretch) -> StepFit | None:
+def step_fit(stretch: Stretch, pasts: tuple[tuple[float, float], ...] = REST) -> StepFit | None:
     """Return what fits best, None where nothing does.
 
     That is where power seems to warm nothing, or with fewer than 8 readings.
+
+    Parameters
+    ----------
+    stretch : Stretch
+        What was applied and read.
+    pasts : tuple of (float, float)
+        Powers that dead time and lag may hold at its beginning, as likely one as another.
     """
     readings_c = stretch.readings_c()
     read = np.isfinite(readings_c)
@@ -60,20 +76,25 @@ def step_fit(stretch: Stretch) -> StepFit | None:
     t_s = stretch.times_s()
     dead_s, lag_s = _grid(float(np.median(np.diff(t_s))))
     late_s = _late(t_s, stretch.given_s(), dead_s, lag_s)[1:][read]
+    coming_s, kept_s = (each[1:][read] for each in _unseen(t_s, dead_s, lag_s))
     y = readings_c[read] - readings_c[read][0]
-    slopes, left = _regressed(t_s[1:][read], late_s, y)
+    each = [_regressed(t_s[1:][read], late_s + p * coming_s + h * kept_s, y) for p, h in pasts]
+    slopes, left = np.array([slopes for slopes, _ in each]), np.array([left for _, left in each])
     least = float(left.min())
     if not math.isfinite(least):
         return None
-    weights = np.exp(-0.5 * len(y) * np.log(np.maximum(left, 1e-12) / max(least, 1e-12)))
+    counted = len(y) if pasts == REST else min(len(y), COUNTED)
+    weights = np.exp(-0.5 * counted * np.log(np.maximum(left, 1e-12) / max(least, 1e-12)))
     weights /= weights.sum()
-    total_s = float(weights @ (dead_s + lag_s))
-    lag = float(weights @ lag_s)
-    slope = float(weights @ (slopes * (dead_s + lag_s))) / total_s  # their product is what is seen
+    total_s = float((weights @ (dead_s + lag_s)).sum())
+    lag = float((weights @ lag_s).sum())
+    # the product of slope and total is what is seen
+    slope = float((weights * slopes * (dead_s + lag_s)).sum()) / total_s
     if not slope > 0.0:
         return None
-    on_edge = bool(weights[-len(_SHARES) :].sum() > 0.5)
-    return StepFit(Process(slope, total_s - lag, (math.inf, lag)), total_s, on_edge)
+    on_edge = bool(weights[:, -len(_SHARES) :].sum() > 0.5)
+    process = Process(slope, total_s - lag, (math.inf, lag))
+    return StepFit(process, total_s, on_edge)
 
 
 def _grid(interval_s: float) -> tuple[Array, Array]:
@@ -99,6 +120,14 @@ def _late(t_s: Array, given_s: Array, dead_s: Array, lag_s: Array) -> Array:
         lagging_s = late_s[i] - delayed_s[i] + rise_s[i]
         late_s[i + 1] = delayed_s[i + 1] - rise_s[i] + lagging_s * left[i]
     return late_s
+
+
+def _unseen(t_s: Array, dead_s: Array, lag_s: Array) -> tuple[Array, Array]:
+    """Return what full power before time 0 adds: of dead time, and of lag; shape (T, K) each."""
+    kept_s = -lag_s * np.expm1(-t_s[:, None] / lag_s)
+    in_s = np.minimum(t_s[:, None], dead_s)
+    stays_s = -lag_s * np.expm1(-in_s / lag_s)
+    return in_s - stays_s * np.exp(-(t_s[:, None] - in_s) / lag_s), kept_s
 
 
 def _regressed(t_s: Array, late_s: Array, y: Array) -> tuple[Array, Array]:

@@ -5,6 +5,7 @@ Its length is bounded: once it is full, neighbours are joined, and it goes on ha
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,6 +72,21 @@ class Stretch:
     def length_s(self) -> float:
         """How long it is."""
         return sum(piece.length_s for piece in self.pieces)
+
+    def since_s(self, power: float) -> float:
+        """Return for how long the power has been less than `power`."""
+        low = itertools.takewhile(lambda piece: piece.power < power, reversed(self.pieces))
+        return sum(piece.length_s for piece in low)
+
+    def last(self, length_s: float) -> Stretch:
+        """Return its last `length_s` in whole intervals, one more where they are not."""
+        kept, reached_s = [], 0.0
+        for piece in reversed(self.pieces):
+            if reached_s >= length_s:
+                break
+            kept.append(piece)
+            reached_s += piece.length_s
+        return Stretch(tuple(reversed(kept)), self.shortest_s)
 
     def times_s(self) -> Array:
         """Return the ends of all intervals, after a leading 0; shape (pieces + 1,)."""
