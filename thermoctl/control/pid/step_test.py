@@ -116,7 +116,7 @@ class StepTest:
         """Return the plant once enough was seen of it, and whether rest before is doubted."""
         stretch, coasting_s = run.stretch, run.stretch.since_s(CUT)
         cut = coasting_s > 0.0
-        rested = None if run.doubted else self._rested(stretch, seen_s, rising)
+        rested = None if run.doubted and not cut else self._rested(stretch, seen_s, rising)
         if rested is None and not cut:
             return None, run.doubted
         loose = step_fit(stretch.last(AROUND * coasting_s) if cut else stretch, ANY)
