@@ -26,7 +26,7 @@ from thermoctl.model import sensor as curves
 from thermoctl.model.arx import Arx, KnownGain
 from thermoctl.ports import Controller, Estimator
 from thermoctl.regulator import Limits, Plan
-from thermoctl.regulator.heater.check import HeaterCheck, weakest_of
+from thermoctl.regulator.heater.check import POWER_RANGE, HeaterCheck, weakest_of
 
 HEAT, COOL, HEAT_COOL = "heat", "cool", "heat-cool"
 
@@ -196,9 +196,12 @@ def _heater_check(table: LoopTable, controller: Controller) -> HeaterCheck | Non
     if weakest is None:
         weakest = weakest_of(table.heater_w, table.volume_l)
     action: Any = action_of(controller)  # a plug-in's may be anything, and is refused there
-    leads = table.leads
-    block_c = None if leads is None else (leads.low_c, leads.high_c)
-    return HeaterCheck(weakest, check.first_heat_s, action, block_c)
+    leads, first_heat_s = table.leads, check.first_heat_s
+    if leads is not None:  # its power is a share of the way between two temperatures
+        return HeaterCheck(weakest, first_heat_s, action, (leads.low_c, leads.high_c))
+    most = 1.0 if table.cooler is None else table.cooler.power_max
+    power_max = max(table.power_max, POWER_RANGE[0])
+    return HeaterCheck(weakest, first_heat_s, action, power_max=power_max, cooler_max=most)
 
 
 def _limits(table: LoopTable, controller: Controller) -> Limits:

@@ -91,15 +91,17 @@ def warm(held: Drive) -> Drive:
 class Vessel:
     """A watch over what loses more the hotter it is.
 
-    `shows` is what is read of it, `left` the share of the heater that is left at a temperature, and
-    `poured` the share of the water for which cold water comes in a second.
+    `asks_for` is the power, `shows` what is read of it, `left` the share of the heater that is left
+    at a temperature, and `poured` the share of the water for which cold water comes in a second.
     """
 
     def __init__(self, gain=0.02, cools_per_s=4e-4, lag_s=20.0, seed=1, **check):
         self.gain, self.cools_per_s, self.pole_s = gain, cools_per_s, 0.5 * lag_s
         self.events = deque()
         self.supervisor = Supervisor(Limits(200.0, -50.0, -50.0, 200.0), self.emit)
-        self.watch = HeaterWatch(HeaterCheck(**check), 1.0, self.supervisor, self.emit)
+        check = HeaterCheck(**check)
+        self.watch = HeaterWatch(check, 1.0, self.supervisor, self.emit)
+        self.asks_for = check.power_max
         self.rng, self.shows = np.random.default_rng(seed), lambda water_c: water_c
         self.left, self.poured = lambda water_c: 1.0, lambda t_s: 0.0
         self.t_s, self.water_c, self.applied, self.given_s = 0.0, 20.0, 0.0, 0.0
@@ -112,7 +114,7 @@ class Vessel:
         return [name for name in self.events if name.startswith("heater.")]
 
     def run(self, seconds):
-        """Give full power wherever nobody forbids it."""
+        """Give all the power that is asked for wherever nobody forbids it."""
         for _ in range(round(seconds)):
             self.first += (self.applied - self.first) / self.pole_s
             self.second += (self.first - self.second) / self.pole_s
@@ -124,7 +126,7 @@ class Vessel:
             self.supervisor.judge(Measurement(self.t_s, reading_c), self.t_s, 1.0)
             self.watch.observe(self.t_s, 1.0, reading_c, self.applied)
             runs = self.supervisor.rule(self.t_s, 0.0) is State.RUN
-            self.applied = float(runs and not self.watch.asks)
+            self.applied = self.asks_for * (runs and not self.watch.asks)
             self.given_s += self.applied
         return self
 

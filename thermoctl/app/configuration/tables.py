@@ -115,8 +115,9 @@ class HeaterCheckTable(Table):
     )
     first_heat_s: Annotated[float, Field(ge=10.0, le=3600.0)] = Field(
         60.0,
-        description="Seconds of full power in which such a heater has to show a rise, or is asked. "
-        "Behind a long pipe, twice the time from power to reading.",
+        description="Seconds of full power in which such a heater has to show a rise, or is asked; "
+        "under a lower `power_max` they are divided by its square. Behind a long pipe, twice the "
+        "time from power to reading.",
     )
 
 

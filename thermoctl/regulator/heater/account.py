@@ -39,6 +39,8 @@ class Account:
     ----------
     weakest : float
         Least gain of a sound heater in K/s.
+    power_max : float
+        Most power the loop gives: what counts as full.
 
     Attributes
     ----------
@@ -46,8 +48,8 @@ class Account:
         Whether the reading has moved no farther than air does.
     """
 
-    def __init__(self, weakest: float) -> None:
-        self._weakest = weakest
+    def __init__(self, weakest: float, power_max: float = 1.0) -> None:
+        self._weakest, self._full = weakest, NEARLY_FULL * power_max
         self.clear()
 
     def clear(self) -> None:
@@ -64,7 +66,7 @@ class Account:
         self._lowest_c = min(self._lowest_c, now.reading_c)
         self._highest_c = max(self._highest_c, now.reading_c)
         self.open = self._range_k < FAR_K
-        if power > NEARLY_FULL:
+        if power > self._full:
             self._full_s = now.t_s
         if before is None:
             return

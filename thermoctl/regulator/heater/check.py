@@ -11,6 +11,7 @@ from thermoctl.ranges import check_ranges, ranged
 WEAKEST_K_PER_S = 6e-5
 """Least gain in K/s of a healthy plant where nothing is configured: 50 W in 200 l."""
 WEAKEST_RANGE_K_PER_S = 1e-6, 0.5
+POWER_RANGE = 1e-6, 1.0
 LARGEST_J_PER_K = 400.0 * WATER_J_PER_L_K
 """Largest heat capacity of a plant in J/K: twice that of 200 l of water, to allow for the vessel
 and for losses meanwhile."""
@@ -30,11 +31,14 @@ class HeaterCheck:
     first_heat_s : float
         Seconds of full power an unknown heater has to show that it heats, before it is asked. Less
         power has longer, by its cube: it does less harm, and a plant that is only held at its set
-        point shows no rise.
+        point shows no rise. The most power that the loop gives has longer by its square.
     action : {'heat', 'cool', 'heat-cool'}
         What power does to the plant; heat-cool: above 0 the one and below 0 the other.
     block_c : tuple of float, optional
         Where another loop acts in place of a heater: its temperatures at power 0 and 1, in degC.
+    power_max, cooler_max : float
+        Most power the loop gives, and most of the cooler beside the heater. What is said of full
+        power holds for these.
 
     Raises
     ------
@@ -46,6 +50,8 @@ class HeaterCheck:
     first_heat_s: float = ranged(60.0, 10.0, 3600.0)
     action: Literal["heat", "cool", "heat-cool"] = "heat"
     block_c: tuple[float, float] | None = None
+    power_max: float = ranged(1.0, *POWER_RANGE)
+    cooler_max: float = ranged(1.0, *POWER_RANGE)
 
     def __post_init__(self) -> None:
         check_ranges(self)
@@ -61,7 +67,12 @@ class HeaterCheck:
     def of_cooler(self) -> HeaterCheck:
         """How that cooler is checked; no least gain is configured for it."""
         weakest_k_per_s = min(self.weakest_k_per_s, WEAKEST_K_PER_S)
-        return replace(self, action="cool", weakest_k_per_s=weakest_k_per_s)
+        return replace(
+            self,
+            action="cool",
+            weakest_k_per_s=weakest_k_per_s,
+            power_max=self.cooler_max,
+        )
 
 
 class Reacts(Protocol):

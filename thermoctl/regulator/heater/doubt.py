@@ -98,7 +98,7 @@ class HeatDoubt:
         Where what is missing began to add up.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, power_max: float = 1.0) -> None:
         self._rates: Heat = (0.0,) * len(LAGS_S)
         self._rise_rate = 0.0
         self._known_s = 0.0
@@ -110,7 +110,7 @@ class HeatDoubt:
         self._cools_per_s = self._cools_loss = self._cools_s = 0.0
         self.since: Seen | None = None
         self._begun: tuple[Seen, Block, bool] | None = None  # of what is taken together
-        self._silence = Silence()
+        self._silence = Silence(power_max)
         self.clear()
 
     def clear(self) -> None:

@@ -56,6 +56,11 @@ reading rose beyond the heat that arrived by less than RISES of what full power 
 class KnownHeater:
     """The gain and the lag of a heater, and how far they can be trusted.
 
+    Parameters
+    ----------
+    power_max : float
+        Most power the loop gives: what counts as full.
+
     Attributes
     ----------
     gain : Gain or None
@@ -64,7 +69,8 @@ class KnownHeater:
         Whether it is of an earlier run, and not yet seen in this one.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, power_max: float = 1.0) -> None:
+        self._power_max, self._full = power_max, NEARLY_FULL * power_max
         self.forget()
 
     def forget(self) -> None:
@@ -143,11 +149,11 @@ class KnownHeater:
     def outdone(self, power: float, before: Seen, now: Seen, sd_k: float) -> bool:
         """Return whether `power` does more than that of the heater that is known could."""
         gain = self.gain
-        if gain is None or power <= NEARLY_FULL:
+        if gain is None or power <= self._full:
             self._outdone_k = 0.0
             return False
         most = OUTDONE if self.recalled else EXTRA_GAINS
-        most_k = most * gain.mean * (now.t_s - before.t_s)
+        most_k = most * gain.mean * self._power_max * (now.t_s - before.t_s)
         self._outdone_k = max(0.0, self._outdone_k + now.reading_c - before.reading_c - most_k)
         return self._outdone_k > max(DOUBT_K, DOUBT_SDS * sd_k)
 
@@ -184,9 +190,11 @@ class KnownHeater:
     def counts(self, power: float) -> float:
         """Return what `power` counts for while a heater has still to be seen.
 
-        The cube of it where nothing is known: at a fifth of the power there are two hours.
+        Where nothing is known, its cube: at a fifth of the power there are two hours. Not so long
+        where the loop gives no more than that: such power is not what holds a plant.
         """
-        return power**3 if self.gain is None else float(power > NEARLY_FULL)
+        known = self.gain is not None
+        return float(power > self._full) if known else power**3 / self._power_max
 
     @property
     def longer_s(self) -> float:

@@ -38,8 +38,8 @@ FALLS = 0.3
 NOISE_SDS = 4.0
 """The same in standard deviations of a reading: of a difference of two at three of its own."""
 HIGH = 0.6
-"""Least power under which a reading is expected to rise. What makes up for a load of which a plant
-stands still is less, or it dips first."""
+"""Least share of full power under which a reading is expected to rise. What makes up for a load of
+which a plant stands still is less, or it dips first."""
 RESTED = 0.3
 """Most heat that arrives, as a share of full power, in a reading that stood before the power."""
 LOSSES, LEFT_SHARE = 2.0, 0.15
@@ -61,15 +61,20 @@ ANSWERS = 0.35
 class Silence:
     """Adds up heat that nothing follows.
 
+    Parameters
+    ----------
+    power_max : float
+        Most power the loop gives: what counts as full.
+
     Attributes
     ----------
     since : Seen or None
         Since when the reading has stood still.
     """
 
-    def __init__(self) -> None:
-        self._fell_k = 0.0
-        self._standing, self._unbroken = Standing(), Unbroken()
+    def __init__(self, power_max: float = 1.0) -> None:
+        self._fell_k, self._high = 0.0, HIGH * power_max
+        self._standing, self._unbroken = Standing(power_max), Unbroken(power_max)
         self.clear()
 
     def clear(self) -> None:
@@ -121,7 +126,7 @@ class Silence:
             self.since, self._rested = now, False
             self._base_c, self._expected_k = now.reading_c, 0.0
             return
-        if self.since is None or block.power < HIGH:
+        if self.since is None or block.power < self._high:
             self.since = self.since or before
             self._rested = heat_k < RESTED * full_k
             self._base_c, self._expected_k = now.reading_c, 0.0

@@ -29,7 +29,8 @@ many times its gain."""
 class Standing:
     """Looks at stretches of full power, and whether each has raised the reading."""
 
-    def __init__(self) -> None:
+    def __init__(self, power_max: float = 1.0) -> None:
+        self._full = NEARLY_FULL * power_max
         self._least_s, self._answered_c = STANDS_S, -math.inf
         self.clear()
 
@@ -40,7 +41,7 @@ class Standing:
 
     def add(self, block: Block, before: Seen) -> None:
         """Take in a block that began with `before`."""
-        if block.power <= NEARLY_FULL:
+        if block.power <= self._full:
             self.clear()
             return
         self._from = self._from or before

@@ -52,12 +52,14 @@ class Trial:
         When the first one began that no rise has followed.
     refused_c : float
         Readings above it teach a gain.
+    refused : bool
+        Whether there was a bad answer, and no rise or good one since.
     """
 
     def __init__(self, check: HeaterCheck) -> None:
         self._first_s, self.weakest = check.first_heat_s, check.weakest_k_per_s
         self._heat_s = self._patience_s = self._first_s
-        self.account = Account(self.weakest)
+        self.account = Account(self.weakest, check.power_max)
         self.begin(0.0)
 
     def begin(self, t_s: float) -> None:
@@ -69,6 +71,7 @@ class Trial:
     def settle(self, t_s: float) -> None:
         """Begin with the first heat again; all the heat there was still counts."""
         self.since_s, self._patience_s = t_s, self._first_s
+        self.refused = False
         self.resume(t_s)
 
     def refuse(self, t_s: float, rows: Iterable[Seen], from_s: float = -math.inf) -> None:
@@ -78,7 +81,7 @@ class Trial:
         a lag.
         """
         self.refused_c = max(row.reading_c for row in rows if row.t_s >= from_s) + RISE_K
-        self._patience_s = self._first_s
+        self._patience_s, self.refused = self._first_s, True
         self.resume(t_s)
 
     def resume(self, t_s: float) -> None:
@@ -91,14 +94,19 @@ class Trial:
         self._lowest_c = math.inf
 
     def question(self, power: float, block: Block, now: Seen) -> Cut | None:
-        """Take in a block that counts as `power`; return what to ask, if anything."""
+        """Take in a block that counts as `power`; return what to ask, if anything.
+
+        After a bad answer all the power there is counts: what explains it will not last.
+        """
         least_k = clear_k(block.sd_k)
+        power = block.power if self.refused else power
         self._count(power * block.span_s, now.reading_c, least_k)
         if self._unasked_s >= self._first_s and self._goes_nowhere(block.sd_k):
             return Cut(now.t_s, self.from_s, self.account.told())
         rise_k, span_s = now.reading_c - self._lowest_c, now.t_s - self.from_s
         if rise_k > least_k:
             self.since_s, self._patience_s = now.t_s, self._first_s
+            self.refused = False
             self._wait(now.t_s)
         elif self._heat_s >= self._patience_s:
             rise = f"a rise by {block.power:.0%} power in {span_s:.0f} s, got {rise_k:.2f} K"

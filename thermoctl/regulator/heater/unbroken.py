@@ -22,7 +22,8 @@ a bad answer: the next one comes within the time in which it latches."""
 class Unbroken:
     """Looks at how long there has been full power."""
 
-    def __init__(self) -> None:
+    def __init__(self, power_max: float = 1.0) -> None:
+        self._power_max = power_max
         self._least_s = UNBROKEN_S
         self.clear()
 
@@ -36,7 +37,7 @@ class Unbroken:
 
     def add(self, block: Block, before: Seen, *, proven: bool) -> None:
         """Take in a block that began with `before`, of a heater that has obeyed or not."""
-        if proven or block.power <= NEARLY_FULL:
+        if proven or block.power <= NEARLY_FULL * self._power_max:
             self._from = None
         elif self._from is None:
             self._from = before
@@ -47,11 +48,12 @@ class Unbroken:
         if start is None or now.t_s - start.t_s < self._least_s:
             return None
         self.clear()
-        if gain.mean * ROUTINE_S < LONGEST_SDS * sd_k:
+        rate = gain.mean * self._power_max
+        if rate * ROUTINE_S < LONGEST_SDS * sd_k:
             return None
         self._least_s = max(LONGER * self._least_s, UNBROKEN_S)
         rise_k, span_s = now.reading_c - start.reading_c, now.t_s - start.t_s
         got = f"full power for {span_s / 60.0:.0f} min and {rise_k:+.1f} K"
-        before_s = clamp(LONGEST_SDS * sd_k / gain.mean, LONGEST_S, 0.5 * ROUTINE_S)
+        before_s = clamp(LONGEST_SDS * sd_k / rate, LONGEST_S, 0.5 * ROUTINE_S)
         why = f"expected less power once, got {got}"
         return Cut(now.t_s, now.t_s - before_s, why, rose=rise_k / span_s)

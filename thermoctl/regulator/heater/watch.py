@@ -52,14 +52,14 @@ class HeaterWatch:
         self._sign = 1.0 if check.action == "heat" else -1.0
         self._blocks = Blocks(period_s, self._sign)
         self._stuck = StuckSensor()
-        self._response, self._doubt, self._climb = HeatResponse(), HeatDoubt(), Climb()
-        self._supervisor, self._emit = supervisor, emit
-        self._heater, self._trial, self._ceiling = KnownHeater(), Trial(check), Ceiling()
+        self._power_max = most = check.power_max
+        self._response, self._doubt, self._climb = HeatResponse(), HeatDoubt(most), Climb()
+        self._supervisor, self._emit, self._verdicts = supervisor, emit, Verdicts(supervisor)
+        self._heater, self._trial, self._ceiling = KnownHeater(most), Trial(check), Ceiling()
         self._settled_s = 0.0  # time at which all heat from before the start has arrived
         self._rows: deque[Seen] = deque(maxlen=ROWS)
         self._cut: Cut | None = None
         self._t_s = self._off_s = 0.0
-        self._verdicts = Verdicts(supervisor)
         self._distrusted_k = 0.0  # heat that must be answered before anything is learnt again
 
     @property
@@ -182,7 +182,7 @@ class HeaterWatch:
             self._response.forget()
         self._heater.disown()
         self._ceiling.clear()
-        self._doubt, self._distrusted_k = HeatDoubt(), 0.0
+        self._doubt, self._distrusted_k = HeatDoubt(self._power_max), 0.0
         self._trial.settle(now.t_s)
         self._ask(ask)
 
@@ -360,18 +360,19 @@ class HeaterWatch:
     def _refuse(self, answer: Answer, cut: Cut, shown: Gain, asked_s: float, t_s: float) -> None:
         """Fail a heater that answered with nothing, or the wrong way.
 
-        One that is not known is asked a second time before anybody is told: while a plant that was
-        never seen comes to rest, anything may move its reading for a minute. One that an earlier
-        run knew may be a weaker one by now, where a little is an answer.
+        One that is not known is asked again before anybody is told: while a plant comes to rest,
+        anything may move its reading. A remembered one may be weaker, where a little is an answer.
         """
         if self._heater.recalled and shown.mean > question.SURE * shown.sd:
             self._accept(shown, asked_s)
             return
-        if self._heater.gain is None and not self._verdicts.lately(self._t_s):
+        if self._heater.gain is None:
+            lately = self._trial.refused or self._verdicts.lately(self._t_s)
             self._verdicts.note(self._t_s)
-            self._trial.refuse(self._t_s, self._rows, cut.from_s)
-            self._resume()
-            return
+            if not lately:
+                self._trial.refuse(self._t_s, self._rows, cut.from_s)
+                self._resume()
+                return
         code = "heater.reversed" if answer is Answer.COOLS else "heater.no_response"
         self._fail(code, f"{cut.why}; {hearing.refused(shown, asked_s, known=self.known)}", t_s)
 
