@@ -150,7 +150,7 @@ class Clerk:
         return {
             "version": __version__,
             "pid": os.getpid(),
-            "state_directory": str(self._state),
+            "state_directory": str(self._state.absolute()),
             "patience_s": self.patience_s,
             "waiting": [name for name in meant if name not in self._seen],
             "loops": records,

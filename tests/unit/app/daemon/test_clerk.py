@@ -1,6 +1,7 @@
 """Calls answered: from the last cycles, or through the loop's queue and after its cycle."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -160,6 +161,12 @@ def test_status_says_how_old_the_last_cycle_is(desk):
     (record,) = desk.ask("status")["loops"]
     assert (record["age_s"], record["missed"], record["period_s"]) == (4.0, 0, 1.0)
     assert json.loads(as_json(record))["temperature_c"] == pytest.approx(25.0, abs=0.01)
+
+
+def test_status_names_the_state_folder_for_whoever_runs_elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    desk = Desk(Path("state"), ("tank",))
+    assert desk.ask("status")["state_directory"] == str(tmp_path / "state")
 
 
 def test_a_loop_that_answers_too_late_finds_the_request_taken_back(desk):
