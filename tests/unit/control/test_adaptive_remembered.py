@@ -10,6 +10,7 @@ from thermoctl.control.adaptive import Adaptive
 from thermoctl.control.adaptive.remembered import (
     DOUBLED_S,
     GAIN_SHARE,
+    LOSING,
     LOSS_SHARE,
     WEIGHT_FLOOR,
     WEIGHT_POWER,
@@ -89,9 +90,11 @@ def first_block(model, age_s=0.0):
 
 
 def test_gain_and_loss_come_back_with_room_to_be_wrong(model):
-    bank = LAW.start_from(model, 0.0).bank
+    begun = LAW.start_from(model, 0.0)
+    bank, beside = begun.bank, begun.memory.held
     assert bank.block is None
-    gain, gain_sd, loss, loss_sd = bank.prior
+    gain, gain_sd, loss, loss_sd, losing = bank.prior
+    assert (losing, beside.belief.prior.losing) == (1.0, LOSING)
     assert (gain, loss) == (model["gain_k_per_s"], model["loss_k_per_s"])
     assert gain_sd == pytest.approx(GAIN_SHARE * gain)
     assert loss_sd == pytest.approx(max(LOSS_SHARE * gain, model["loss_sd_k_per_s"]))

@@ -6,7 +6,7 @@ has the equations, and the glossary the words. In the order in which a sample me
 
 - `controller` is the law as a `Controller`; `constants` are its settings.
 - `trial` runs a remembered bank beside one that knows nothing, and keeps the better; `remembered`
-  is what is kept between runs.
+  is what is kept between runs, `held` the remembered bank of a plant that was held until just now.
 - `bank` takes a sample through prediction and correction. `Bank.predict` is the time update and
   `Bank.correct` the measurement update; `bank_belief` is the state of both. At a start there are
   `twins`: met at rest, and met under full power.

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, NamedTuple
 
-from thermoctl.control.adaptive import trial
+from thermoctl.control.adaptive import held, trial
 from thermoctl.control.adaptive.bank import Bank
 from thermoctl.control.adaptive.bank_belief import BankBelief
 from thermoctl.control.adaptive.coasting import Outlook, ahead, power_for
@@ -153,14 +153,15 @@ class Adaptive:
             raise ValueError(f"expected action {self.action!r}, got {remembered.get('action')!r}")
         bank = recalled(self.bank, remembered, age_s)
         rival = self.bank.start(noise=bank.noise)
-        return AdaptiveBelief(bank, memory=Memory(rival))
+        steers, beside = held.begun(self.bank, bank)
+        return AdaptiveBelief(steers, memory=Memory(rival, beside))
 
     def under(self, belief: AdaptiveBelief, power: float) -> AdaptiveBelief:
         """Return the `belief` to begin with of a plant that has long had `power`."""
         law, heat, rival = self.bank, heat_of(power, self.cooling_ratio), belief.memory.rival
         if rival is not None:
             rival = law.under(rival, heat)
-        memory = replace(belief.memory, rival=rival)
+        memory = replace(belief.memory, rival=rival, held=None)
         return belief._replace(bank=law.under(belief.bank, heat), memory=memory)
 
     def remember(self, belief: AdaptiveBelief) -> Mapping[str, Any] | None:

@@ -56,12 +56,15 @@ class Prior(NamedTuple):
         Heating rate at full power.
     loss, loss_sd : float
         Cooling without power.
+    losing : float
+        1 where it has long been so, as in a plant that was held; 0 in one that is met cold.
     """
 
     gain: float = START_GAIN
     gain_sd: float = START_SD[BETA]
     loss: float = 0.0
     loss_sd: float = START_SD[D]
+    losing: float = 0.0
 
 
 UNKNOWN = Prior()
@@ -150,7 +153,7 @@ def start(
 ) -> Block:
     """Return the block at the first reading of a plant, at rest or long under `heat`.
 
-    Under heat the sensor is behind the water by what beta does in its lag.
+    Under heat the sensor is behind the water by what beta does in its lag, less what d does.
     """
     h, block = hypotheses.period_s, np.zeros((4, 5, len(hypotheses)))
     sd = np.array([*START_SD[:D], prior.loss_sd * h, prior.gain_sd * h])
@@ -159,9 +162,9 @@ def start(
     block[:, :X] = P[:, :, None]
     block[:, X] = np.array([y_c, y_c, prior.loss * h, prior.gain * h])[:, None]
     if heat is not None:
-        behind = hypotheses.sensor * heat
-        block[T] += behind * block[BETA]
-        block[:, T] += behind * block[:, BETA]
+        behind, above = hypotheses.sensor * heat, hypotheses.sensor * prior.losing
+        block[T] += behind * block[BETA] - above * block[D]
+        block[:, T] += behind * block[:, BETA] - above * block[:, D]
     return block
 
 
@@ -262,10 +265,8 @@ def _widened(block: Block, before: Array) -> None:
 
 def arrivals(hypotheses: Hypotheses, plants: Plants) -> Mapping[int, Array]:
     """Return, by sample, how much is loosened where the heat has just arrived."""
-    lags = hypotheses.lag_s / hypotheses.period_s
-    samples = np.floor(plants.loosened_lags * lags) + 1.0
-    share = plants.loosened_share
-    return {int(each): share * (samples == each) for each in np.unique(samples)}
+    samples = np.floor(plants.loosened_lags * (hypotheses.lag_s / hypotheses.period_s)) + 1.0
+    return {int(each): plants.loosened_share * (samples == each) for each in np.unique(samples)}
 
 
 def loosened(block: Block, heat: Array, spread: Array) -> None:
@@ -377,8 +378,7 @@ def caught_up(block: Block, before: Block, samples: int) -> Array:
     they are. And gains are slowly forgotten, by as much in every sample. Returned is by what the
     gain K of the loss is larger for it, shape (n,).
     """
-    BB = block[BETA, BETA]
-    BB += samples * np.maximum(BB - before[BETA, BETA], 0.0)
+    block[BETA, BETA] += samples * np.maximum(block[BETA, BETA] - before[BETA, BETA], 0.0)
     share = np.minimum(np.maximum(block[D, D] / before[D, D], 1.0 - CAUGHT_UP), 1.0 + CAUGHT_UP)
     scale: Array = share ** (0.5 * samples)
     block[D, :X] *= scale

@@ -39,6 +39,10 @@ GAIN_SHARE = 0.2
 LOSS_SHARE = 0.05
 """Least standard deviation of a recalled loss, as a share of the gain: it depends on temperature
 and surroundings. With twice as much, the loss takes the blame for a gain that is too high."""
+LOSING = 0.3
+"""Share of what a lasting loss makes the sensor lag by, where power was none or full: the plant may
+have been so for long, or for the seconds of a restart. With 1 hot air overshoots after 20 s without
+power, with 0 after 60."""
 DOUBLED_S = 14 * 86400.0
 """Age in s at which the variance of the gain is twice as large; it grows in proportion to the
 age."""
@@ -104,6 +108,7 @@ def recalled(bank: Bank, remembered: Mapping[str, Any], age_s: float) -> BankBel
         aged * max(rate_sd, GAIN_SHARE * rate),
         lost,
         max(lost_sd, LOSS_SHARE * rate),
+        losing=LOSING,
     )
     weights = weighted(np.maximum(WEIGHT_POWER * log, WEIGHT_FLOOR))
     return bank.start(prior, Noise(variance, coldest_c=coldest_c), weights)

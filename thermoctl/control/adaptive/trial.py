@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from thermoctl.control.adaptive.bank import Bank
 from thermoctl.control.adaptive.bank_belief import BankBelief
 from thermoctl.control.adaptive.evidence import EVIDENCE_FROM
+from thermoctl.control.adaptive.held import Held, observed, seen
 
 DROP_ODDS = -3.0
 """Log odds below which the remembered bank is dropped: 20 to 1 against it."""
@@ -39,6 +40,8 @@ class Memory:
     ----------
     rival : BankBelief or None
         The bank that began with nothing; None when there is no trial, or it is over.
+    held : Held or None
+        The remembered one from another past; None once that is settled.
     odds : float
         Natural logarithm of the odds for the remembered one.
     heard_s : float
@@ -48,6 +51,7 @@ class Memory:
     """
 
     rival: BankBelief | None = None
+    held: Held | None = None
     odds: float = 0.0
     heard_s: float = 0.0
     verdict: str = ""
@@ -65,26 +69,27 @@ def observe(
     law: Bank, bank: BankBelief, memory: Memory, y_c: float, applied: float
 ) -> tuple[BankBelief, Memory]:
     """Return bank and trial after a period of `applied` and the reading `y_c`."""
-    ahead, rival = law.predict(bank, applied), memory.rival
-    after = law.correct(bank, ahead, y_c)
+    rival, held = memory.rival, memory.held
     if rival is None:
-        return after, memory
+        return law.observe(bank, y_c, applied), memory
+    if held is None:
+        after, told = seen(law, bank, y_c, applied)
+    else:
+        after, held, told = observed(law, bank, held, y_c, applied)
     rivals = law.predict(rival, applied)
     odds, heard = memory.odds, 0.0
     if math.isfinite(y_c) and after.sample >= EVIDENCE_FROM:
         heard = after.excitation.share
     if heard > 0.0:
-        odds += heard * (
-            law.log_likelihood(bank, ahead, y_c) - law.log_likelihood(rival, rivals, y_c)
-        )
+        odds += heard * (told - law.log_likelihood(rival, rivals, y_c))
     heard_s = memory.heard_s + heard * law.period_s
-    return _judged(after, Memory(law.correct(rival, rivals, y_c), odds, heard_s))
+    return _judged(after, Memory(law.correct(rival, rivals, y_c), held, odds, heard_s))
 
 
 def lost(law: Bank, bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:
     """Return bank and trial after a gap of which the applied power is not known."""
     rival = memory.rival
-    after = memory if rival is None else replace(memory, rival=law.lost(rival))
+    after = memory if rival is None else replace(memory, rival=law.lost(rival), held=None)
     return law.lost(bank), after
 
 
@@ -95,9 +100,9 @@ def _judged(bank: BankBelief, memory: Memory) -> tuple[BankBelief, Memory]:
         return bank, memory
     enough_s = max(HEARD_S, HEARD_LAGS * bank.outlook.lag_s)
     if odds < DROP_ODDS or (odds < 0.0 and heard_s >= enough_s):
-        return rival, Memory(None, odds, heard_s, DROPPED, _words(odds, heard_s))
+        return rival, Memory(None, None, odds, heard_s, DROPPED, _words(odds, heard_s))
     if heard_s >= enough_s:
-        return bank, Memory(None, odds, heard_s, TRUSTED, _words(odds, heard_s))
+        return bank, Memory(None, None, odds, heard_s, TRUSTED, _words(odds, heard_s))
     return bank, memory
 
 
