@@ -20,9 +20,9 @@ BLOCK_S, NOISE_K, WEAKEST = 4.0, 0.005, 9e-4
 PLACES = len(LAGS_S)
 
 
-def asked_s(seconds, gain=0.04, rise_k_per_s=0.0, power=1.0, answers_s=0.0):
+def asked_s(seconds, gain=0.04, rise_k_per_s=0.0, power=1.0, answers_s=0.0, power_max=1.0):
     """Return when a reading that rises by so much is asked; it answers for so long after."""
-    standing, known, at_s = Standing(), Gain(gain, 0.01 * gain, 0), []
+    standing, known, at_s = Standing(power_max), Gain(gain, 0.01 * gain, 0), []
     before = Seen(0.0, 20.0, (0.0,) * PLACES)
     while before.t_s < seconds:
         t_s = before.t_s + BLOCK_S
@@ -40,6 +40,11 @@ def test_what_stands_is_asked_and_what_has_answered_is_left_alone_for_longer():
     assert np.diff([0.0, *asked_s(10_000.0)]) == pytest.approx(STANDS_S, abs=tardy_s)
     waits_s = np.diff([0.0, *asked_s(20_000.0, answers_s=100.0)])
     assert waits_s == pytest.approx([STANDS_S, ANSWERED_S, ANSWERED_S], abs=tardy_s)
+
+
+def test_full_power_is_the_most_that_the_loop_gives():
+    assert asked_s(1000.0, power=0.5, power_max=0.5) == asked_s(1000.0)
+    assert asked_s(7200.0, power=0.4, power_max=0.5) == []
 
 
 @pytest.mark.parametrize(
