@@ -37,6 +37,12 @@ def test_a_cooler_makes_the_range_signed_within_its_own_limit():
     assert (limits.power_min, limits.changeover_s, limits.power_cools) == (-0.4, 30.0, False)
 
 
+def test_heater_and_cooler_are_each_checked_by_the_most_power_they_get():
+    document = changed(power_max=0.5, cooler={"board": "daq", "power_max": 0.4})
+    check = plan_for(load(document).loops["tank"]).heater_check
+    assert (check.of_heater.power_max, check.of_cooler.power_max) == (0.5, 0.4)
+
+
 def test_a_lone_cooler_keeps_powers_from_0_to_1():
     limits = plan_for(load(changed("cool")).loops["tank"]).limits
     assert (limits.power_min, limits.power_cools) == (0.0, True)
